@@ -1,0 +1,18 @@
+# equipoise_lcm_types: C++ headers of lcm/*.lcm (an interface library) and, beside them, the Python package
+# `equipoise_lcm` in <build>/lcm/python, for tools and tests. Debian's liblcm-dev ships no CMake helper.
+find_program(LCM_GEN lcm-gen REQUIRED)
+file(GLOB lcm_files CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/lcm/*.lcm)
+set(lcm_out ${CMAKE_BINARY_DIR}/lcm)
+set(lcm_stamp ${lcm_out}/generated.stamp)
+add_custom_command(
+  OUTPUT ${lcm_stamp}
+  COMMAND ${LCM_GEN} --cpp --cpp-hpath ${lcm_out}/cpp ${lcm_files}
+  COMMAND ${LCM_GEN} --python --ppath ${lcm_out}/python ${lcm_files}
+  COMMAND ${CMAKE_COMMAND} -E touch ${lcm_stamp}
+  DEPENDS ${lcm_files}
+  COMMENT "Generating LCM types")
+add_custom_target(equipoise_lcm_generate DEPENDS ${lcm_stamp})
+add_library(equipoise_lcm_types INTERFACE)
+target_include_directories(equipoise_lcm_types SYSTEM INTERFACE ${lcm_out}/cpp)
+target_link_libraries(equipoise_lcm_types INTERFACE PkgConfig::LCM)
+add_dependencies(equipoise_lcm_types equipoise_lcm_generate)
