@@ -1,0 +1,213 @@
+"""The checks on our own tree, and proof that each of them bites."""
+
+from pathlib import Path
+
+import pytest
+from equipoise_tools.lint import formatting, house, law, tidy
+from equipoise_tools.lint.tree import Tree, tree_of_folder, tree_of_git
+
+
+def planted(folder: Path, **files: str) -> Tree:
+    """A tree with these files; `__` in a keyword stands for `/`, the last `_` for the dot."""
+    for key, text in files.items():
+        name = ".".join(key.replace("__", "/").rsplit("_", 1))
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tree_of_folder(folder)
+
+
+def listing(findings) -> str:
+    return "\n".join(map(str, findings))
+
+
+@pytest.fixture(scope="module")
+def tree(root) -> Tree:
+    return tree_of_git(root)
+
+
+@pytest.mark.parametrize(
+    "check", [formatting.clang_format, formatting.black, formatting.ruff, formatting.shellcheck]
+)
+def test_our_files_pass(tree, check):
+    findings = check(tree)
+    assert not findings, listing(findings)
+
+
+def test_our_tree_keeps_the_dependency_law(tree):
+    assert not (findings := law.law(tree)), listing(findings)
+
+
+def test_our_tree_keeps_the_house_rules(tree):
+    assert not (findings := house.house(tree)), listing(findings)
+
+
+@pytest.mark.slow
+def test_our_sources_pass_clang_tidy(tree):
+    assert not (findings := tidy.clang_tidy(tree)), listing(findings)
+
+
+def test_the_checks_see_our_files(tree):
+    assert "drivers/robot_io.h" in tree.ending(".h")
+    assert {"tools/run", "tools/test", "tools/lib/setup.sh", ".ci/run"} <= set(tree.shell_scripts())
+    assert "tools/equipoise_tools/lint/law.py" in tree.ending(".py")
+
+
+def test_formatters_name_a_badly_formatted_file(tmp_path):
+    tree = planted(
+        tmp_path, src__a_cpp="int  f( ) { return 1 ; }\n", b_py="x = {  1:2 }\nimport os\n", c_sh="echo $1\n"
+    )
+    assert [f.path for f in formatting.clang_format(tree)] == ["src/a.cpp"]
+    assert [f.path for f in formatting.black(tree)] == ["b.py"]
+    assert {f.path for f in formatting.ruff(tree)} == {"b.py"}
+    assert {f.path for f in formatting.shellcheck(tree)} == {"c.sh"}
+
+
+def test_generated_files_are_not_formatted(tmp_path):
+    assert not formatting.clang_format(planted(tmp_path, config__generated__gains_hpp="int  f( ) ;\n"))
+
+
+STAGE = "include__equipoise__estimate__ekf_hpp"
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "<unistd.h>",
+        "<sys/mman.h>",
+        "<linux/i2c.h>",
+        "<thread>",
+        "<mutex>",
+        "<iostream>",
+        "<chrono>",
+        "<lcm/lcm-cpp.hpp>",
+    ],
+)
+@pytest.mark.parametrize("name", [STAGE, "src__plant__world_cpp", "include__equipoise__robots__mip_hpp"])
+def test_law_keeps_the_operating_system_out_of_core(tmp_path, name, header):
+    findings = law.law(planted(tmp_path, **{name: f"// x\n#include <array>\n#include {header}\n"}))
+    assert [f.line for f in findings] == [3]
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["equipoise/types.hpp", "equipoise/samples.hpp", "equipoise/robots/mbbr.hpp", "generated/mbbr_gains.hpp"]
+    + ["equipoise/estimate/joseph.hpp", "equipoise/config/ekf.hpp"],
+)
+def test_law_lets_a_stage_know_values_robots_and_its_own_room(tmp_path, header):
+    assert not law.law(planted(tmp_path, **{STAGE: f'#include <Eigen/Core>\n#include "{header}"\n'}))
+
+
+@pytest.mark.parametrize(
+    "header", ["equipoise/control/slc.hpp", "equipoise/plant/world.hpp", "equipoise/pipeline.hpp"]
+)
+def test_law_keeps_other_rooms_out_of_a_stage(tmp_path, header):
+    findings = law.law(planted(tmp_path, **{STAGE: f'#include "{header}"\n'}))
+    assert [(f.path, f.line) for f in findings] == [("include/equipoise/estimate/ekf.hpp", 1)]
+
+
+def test_law_lets_only_the_pipeline_join_stages(tmp_path):
+    both = '#include "equipoise/sense/calibrate.hpp"\n#include "equipoise/control/slc.hpp"\n'
+    tree = planted(
+        tmp_path, include__equipoise__pipeline_hpp=both, include__equipoise__runtime__loop_hpp=both
+    )
+    assert [(f.path, f.line) for f in law.law(tree)] == [("include/equipoise/runtime/loop.hpp", 2)]
+
+
+def test_law_lets_only_the_application_join_core_and_drivers(tmp_path):
+    driver = '#include "mpu9250.h"\n'
+    tree = planted(
+        tmp_path,
+        drivers__mpu9250_h="",
+        src__app__board_cpp=driver,
+        src__config__board_cpp=driver,
+        src__plant__world_cpp=driver,
+    )
+    assert [f.path for f in law.law(tree)] == ["src/config/board.cpp", "src/plant/world.cpp"]
+
+
+def test_law_lets_robots_be_told_apart_in_one_file(tmp_path):
+    switch = 'if (config.robot == "mip") {\n} else if (config.robot == "mbbr") {\n}\n'
+    tree = planted(
+        tmp_path,
+        src__app__sim_cpp=switch,
+        src__app__walk_cpp="switch (robot) {\n",
+        src__plant__world_cpp="// if (robot == 1)\nif (a) go(robot);\nif (robot_kind() != 2) {}\n",
+    )
+    assert [(f.path, f.line) for f in law.law(tree)] == [
+        ("src/app/walk.cpp", 1),
+        ("src/plant/world.cpp", 3),
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    # Put together here, so that this file does not hold what it forbids.
+    [
+        "see /" + "work/main",
+        "cd '/" + "root'",
+        "pip --index" + "-url https://x",
+        "shared" + "/thesis",
+        "// TO" + "DO later",
+    ],
+)
+def test_house_finds_what_must_not_be_tracked(tmp_path, text):
+    findings = house.forbidden_words(planted(tmp_path, docs__a_md="line\n" + text + "\n"))
+    assert [(f.path, f.line) for f in findings] == [("docs/a.md", 2)]
+
+
+def test_house_allows_ordinary_text(tmp_path):
+    assert not house.forbidden_words(
+        planted(tmp_path, a_md="the network/work of a root/child, ${x}/workspace")
+    )
+
+
+def test_house_wants_headers_to_open_with_a_short_comment(tmp_path):
+    tree = planted(
+        tmp_path,
+        include__equipoise__good_hpp="// what\n// in -> out\n#pragma once\n",
+        include__equipoise__bare_hpp="#pragma once\n",
+        drivers__long_h="/* 1\n" + " * x\n" * 8 + " */\n",
+    )
+    found = {f.path: f.message for f in house.headers_open_with_a_comment(tree)}
+    assert set(found) == {"include/equipoise/bare.hpp", "drivers/long.h"}
+    assert "opens with 10 lines" in found["drivers/long.h"]
+
+
+def test_house_wants_short_files(tmp_path):
+    tree = planted(
+        tmp_path, src__long_cpp="x\n" * 401, src__fits_cpp="x\n" * 400, config__generated__m_hpp="x\n" * 999
+    )
+    assert [f.path for f in house.short_files(tree)] == ["src/long.cpp"]
+
+
+class TestClangTidy:
+    @pytest.fixture
+    def project(self, tmp_path, root):
+        (tmp_path / "build" / "host").mkdir(parents=True)
+        (tmp_path / ".clang-tidy").write_text((root / ".clang-tidy").read_text())
+        command = f"c++ -I{tmp_path}/include -o a.o -c {tmp_path}/src/a.cpp"
+        (tmp_path / "build" / "host" / "compile_commands.json").write_text(
+            f'[{{"directory": "{tmp_path}", "file": "src/a.cpp", "command": "{command}"}}]'
+        )
+        planted(tmp_path, include__equipoise__a_hpp="// a\ninline int a() { return 1; }\n")
+        return tmp_path
+
+    def test_it_finds_a_defect_and_remembers_only_a_pass(self, project):
+        bad = '#include "equipoise/a.hpp"\nint f() {\n  int x;\n  return x + a();\n}\n'
+        tree = planted(project, src__a_cpp=bad)
+        findings = tidy.clang_tidy(tree)
+        assert [(f.path, f.line) for f in findings if "init-variables" in f.message] == [("src/a.cpp", 3)]
+        assert tidy.clang_tidy(tree) == findings
+        tree = planted(project, src__a_cpp=bad.replace("int x;", "int x = 0;"))
+        assert tidy.clang_tidy(tree) == []
+        assert len(list((project / "build/host/tidy").iterdir())) == 1
+
+    def test_it_looks_again_when_a_header_changed(self, project):
+        tree = planted(project, src__a_cpp='#include "equipoise/a.hpp"\nint f() { return a(); }\n')
+        assert tidy.clang_tidy(tree) == []
+        (before,) = (project / "build/host/tidy").iterdir()
+        planted(project, include__equipoise__a_hpp="// a\ninline int a() { return 2; }\n")
+        assert tidy.clang_tidy(tree) == []
+        (after,) = (project / "build/host/tidy").iterdir()
+        assert before.name != after.name

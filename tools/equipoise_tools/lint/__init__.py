@@ -1,0 +1,1 @@
+"""Formatting, static analysis, dependency law and house rules, as functions that return findings."""

@@ -1,0 +1,75 @@
+"""House rules a machine can check: the project stands alone, headers explain themselves, files stay short."""
+
+from __future__ import annotations
+
+import re
+
+from .tree import Finding, Tree, is_generated
+
+# Paths of one developer's machine, package hosts, and the source text, which is not ours to ship.
+FORBIDDEN = (
+    (
+        re.compile(r"/(?:wor[k]|far[m]|roo[t])/|(?<![\w.)}>*])/(?:wor[k]|far[m]|roo[t])\b"),
+        "a path of one machine",
+    ),
+    (re.compile(r"(?:\bdeb |index-ur[l]|registr[y]).*https?://", re.I), "a package host"),
+    (re.compile(r"share[d]/thesis|thesis\.tx[t]"), "a reference to the dissertation's file"),
+    (re.compile(r"#\s*if\s+[0]\b|\bTOD[O]\b|\bFIXM[E]\b|\bXX[X]\b"), "residue: do it or drop it"),
+)
+LONGEST_OPENING_COMMENT = 8
+LONGEST_FILE = 400
+_BINARY = (".png", ".lcm", ".log", ".bin", ".gz", ".ico", ".csv")
+
+
+def forbidden_words(tree: Tree) -> list[Finding]:
+    findings = set()
+    for name in tree.files:
+        if name.endswith(_BINARY):
+            continue
+        text = tree.text(name)
+        for pattern, what in FORBIDDEN:
+            for match in pattern.finditer(text):
+                line = text.count("\n", 0, match.start() + 1) + 1
+                findings.add(Finding(name, line, f"holds {what}: {match[0].strip()}"))
+    return sorted(findings)
+
+
+def opening_comment(text: str) -> int:
+    """How many lines the comment at the top of the file takes; 0 when there is none."""
+    lines = text.splitlines()
+    if lines and lines[0].startswith("//"):
+        return next((i for i, line in enumerate(lines) if not line.startswith("//")), len(lines))
+    if lines and lines[0].startswith("/*"):
+        return next((i + 1 for i, line in enumerate(lines) if "*/" in line), len(lines))
+    return 0
+
+
+def headers_open_with_a_comment(tree: Tree) -> list[Finding]:
+    findings = []
+    for name in tree.ending(".h", ".hpp"):
+        if not name.startswith(("include/", "drivers/", "src/")):
+            continue
+        lines = opening_comment(tree.text(name))
+        if lines == 0:
+            findings.append(Finding(name, 1, "does not open with a comment: what, in -> out, RT-safe or not"))
+        elif lines > LONGEST_OPENING_COMMENT:
+            findings.append(
+                Finding(name, 1, f"opens with {lines} lines, more than {LONGEST_OPENING_COMMENT}")
+            )
+    return findings
+
+
+def short_files(tree: Tree) -> list[Finding]:
+    findings = []
+    for name in tree.files:
+        if name.endswith((".c", ".h", ".cpp", ".hpp", ".py")) and not is_generated(name):
+            lines = tree.text(name).count("\n")
+            if lines > LONGEST_FILE:
+                findings.append(
+                    Finding(name, 0, f"has {lines} lines, more than {LONGEST_FILE}: split the room")
+                )
+    return findings
+
+
+def house(tree: Tree) -> list[Finding]:
+    return forbidden_words(tree) + headers_open_with_a_comment(tree) + short_files(tree)

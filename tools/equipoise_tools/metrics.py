@@ -1,0 +1,178 @@
+"""Numbers of a run, from its log alone: errors against the simulation's truth, duties, timing, events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import names
+from .log import Log
+
+SETTLE_S = 5.0  # errors count after it, as in `equipoise sim --json`
+FALLEN_RAD = 0.6  # the safety gate's default tilt limit
+SATURATED = 1.0 - 1e-9
+
+
+@dataclass
+class Errors:
+    """Of one estimator, against the truth."""
+
+    attitude_rmse_rad: float
+    rolling_rmse_rad_s: float  # of the ball's or the wheels' rate
+    speed_rmse_m_s: float | None  # the same in metres, when the log says the radius
+    t_s: np.ndarray = field(repr=False)
+    attitude_rad: np.ndarray = field(repr=False)  # error's length over the tilt axes
+    rolling_rad_s: np.ndarray = field(repr=False)
+
+
+@dataclass
+class Summary:
+    robot: str
+    duration_s: float
+    ticks: int
+    armed_s: float
+    fell_at_s: float | None
+    yaw_rate_mean_hz: float | None = None
+    duty_max: float | None = None
+    saturated_fraction: float | None = None
+    position_rmse_m: float | None = None
+    compute_us: tuple[float, float, float] | None = None  # median, 99th percentile, largest
+    overruns: int = 0
+    dropped_records: int = 0
+    battery_V: tuple[float, float] | None = None  # lowest, mean
+    estimators: dict[str, Errors] = field(default_factory=dict)
+    events: list[tuple[float, str]] = field(default_factory=list)
+
+
+def run_record(log: Log):
+    return log[names.RUN][0] if names.RUN in log else None
+
+
+def robot_of(log: Log) -> str:
+    run = run_record(log)
+    if run is not None:
+        return run.robot
+    wheels = log[names.MOTORS]["motors"][0] if names.MOTORS in log else 0
+    return {2: "mip", 3: "mbbr"}.get(int(wheels), "robot")
+
+
+def tilt_axes(log: Log) -> int:
+    """The MBBR tilts about two axes, the MIP about one."""
+    return 1 if robot_of(log) == "mip" else 2
+
+
+def aligned(log: Log, first: str, second: str) -> tuple[np.ndarray, np.ndarray]:
+    """The records of two channels that belong to the same ticks: either may have lost some."""
+    a, b = log[first], log[second]
+    _, i, j = np.intersect1d(a["tick"], b["tick"], return_indices=True)
+    return a[i], b[j]
+
+
+def wrapped(angle_rad: np.ndarray) -> np.ndarray:
+    return (angle_rad + np.pi) % (2 * np.pi) - np.pi
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
+
+
+def errors_of(log: Log, channel: str) -> Errors:
+    estimate, truth = aligned(log, channel, names.TRUTH)
+    axes = tilt_axes(log)
+    t_s = (estimate["utime"] - log.start_utime) * 1e-6
+    tilt = wrapped(estimate["theta_rad"][:, :axes] - truth["theta_rad"][:, :axes])
+    rolling = estimate["phi_dot_rad_s"][:, :axes] - truth["phi_dot_rad_s"][:, :axes]
+    counted = t_s >= SETTLE_S
+    run = run_record(log)
+    rolling_rmse = rms(rolling[counted])
+    return Errors(
+        attitude_rmse_rad=rms(tilt[counted]),
+        rolling_rmse_rad_s=rolling_rmse,
+        speed_rmse_m_s=rolling_rmse * run.rolling_radius_m if run is not None else None,
+        t_s=t_s,
+        attitude_rad=np.linalg.norm(tilt, axis=1),
+        rolling_rad_s=np.linalg.norm(rolling, axis=1),
+    )
+
+
+def estimator_channels(log: Log) -> dict[str, str]:
+    """Estimator -> channel, the controlling one first."""
+    found = {}
+    if names.STATE in log:
+        run = run_record(log)
+        found[run.estimator if run is not None else "estimate"] = names.STATE
+    for channel in sorted(log):
+        name = names.estimator_of(channel)
+        if name is not None:
+            found.setdefault(name, channel)
+    return found
+
+
+def safety_events(log: Log) -> list[tuple[float, str]]:
+    """When the motors' permission or the reasons against it changed, in words."""
+    if names.HEALTH not in log:
+        return []
+    health = log[names.HEALTH]
+    t_s = log.seconds(names.HEALTH)
+    key = np.stack([health["arm_state"], health["reasons"], health["sensor_health"]], axis=1)
+    changed = np.flatnonzero(np.any(key[1:] != key[:-1], axis=1)) + 1
+    events = []
+    for i in [0, *changed]:
+        words = [names.arm_state(int(health["arm_state"][i]))]
+        words += names.bits(int(health["reasons"][i]), names.SAFETY_REASONS)
+        words += names.bits(int(health["sensor_health"][i]), names.SENSOR_HEALTH)
+        events.append((float(t_s[i]), ", ".join(words)))
+    return events
+
+
+def fell_at(log: Log) -> float | None:
+    channel = names.TRUTH if names.TRUTH in log else names.STATE
+    if channel not in log:
+        return None
+    tilt = np.linalg.norm(log[channel]["theta_rad"][:, : tilt_axes(log)], axis=1)
+    over = np.flatnonzero(tilt > FALLEN_RAD)
+    return float(log.seconds(channel)[over[0]]) if over.size else None
+
+
+def summarise(log: Log) -> Summary:
+    best = names.TRUTH if names.TRUTH in log else names.STATE
+    longest = max((channel for channel in log if channel != names.RUN), key=lambda channel: log[channel].size)
+    summary = Summary(
+        robot=robot_of(log),
+        duration_s=log.duration_s,
+        ticks=log[longest].size,
+        armed_s=0.0,
+        fell_at_s=fell_at(log),
+    )
+    if best in log:
+        settled = log.seconds(best) >= SETTLE_S
+        rate = log[best]["omega_B_rad_s"][settled, 2]
+        summary.yaw_rate_mean_hz = float(rate.mean() / (2 * np.pi)) if rate.size else None
+    if names.MOTORS in log:
+        motors = log[names.MOTORS]
+        duty = np.abs(motors["duty"])
+        summary.duty_max = float(duty.max())
+        summary.saturated_fraction = float(motors["saturated"].mean())
+    if names.HEALTH in log:
+        health = log[names.HEALTH]
+        ticks_armed = np.count_nonzero(health["arm_state"] == names.ARM_STATES.index("armed"))
+        summary.armed_s = ticks_armed / health.size * log.duration_s
+        summary.battery_V = float(health["battery_V"].min()), float(health["battery_V"].mean())
+    if names.TIMING in log:
+        timing = log[names.TIMING]
+        compute_us = timing["compute_ns"] * 1e-3
+        summary.compute_us = tuple(float(np.percentile(compute_us, p)) for p in (50, 99, 100))
+        summary.overruns = int(timing["overruns"].max())
+        summary.dropped_records = int(timing["dropped_records"].max())
+    if names.TRUTH in log:
+        summary.estimators = {
+            name: errors_of(log, channel) for name, channel in estimator_channels(log).items()
+        }
+        if names.REFERENCE in log:
+            truth, reference = aligned(log, names.TRUTH, names.REFERENCE)
+            counted = (truth["utime"] - log.start_utime) * 1e-6 >= SETTLE_S
+            miss = truth["position_W_m"][counted] - reference["position_W_m"][counted]
+            summary.position_rmse_m = rms(np.linalg.norm(miss, axis=1)) if miss.size else None
+    summary.events = safety_events(log)
+    return summary

@@ -1,0 +1,50 @@
+"""Channels, and the words for what the firmware sends as numbers (a test holds them to the C++ headers)."""
+
+RUN = "EQUIPOISE_RUN"
+SENSORS = "EQUIPOISE_SENSORS"
+COMMAND = "EQUIPOISE_COMMAND"
+STATE = "EQUIPOISE_STATE"
+REFERENCE = "EQUIPOISE_REFERENCE"
+TRUTH = "EQUIPOISE_TRUTH"
+MOTORS = "EQUIPOISE_MOTORS"
+HEALTH = "EQUIPOISE_HEALTH"
+TIMING = "EQUIPOISE_TIMING"
+
+ARM_STATES = ("disarmed", "armed", "fault")
+# Bit by bit, enum SafetyReason.
+SAFETY_REASONS = (
+    "not requested",
+    "tilt",
+    "imu stale",
+    "encoder stale",
+    "not finite",
+    "battery low",
+    "attitude stale",
+    "gyro moving",
+)
+# Bit by bit, enum rio_health.
+SENSOR_HEALTH = (
+    "imu clipped",
+    "imu stuck",
+    "imu late",
+    "imu bus error",
+    "dmp overflow",
+    "dmp bad packet",
+    "encoder error",
+    "bridge fault",
+    "battery error",
+)
+
+
+def bits(value: int, words: tuple[str, ...]) -> list[str]:
+    """The words for the bits that are set; a bit without a word is named by its number."""
+    return [words[i] if i < len(words) else f"bit {i}" for i in range(32) if value >> i & 1]
+
+
+def arm_state(value: int) -> str:
+    return ARM_STATES[value] if 0 <= value < len(ARM_STATES) else f"state {value}"
+
+
+def estimator_of(channel: str) -> str | None:
+    """EQUIPOISE_STATE_EKF13 -> "ekf13": the estimator that runs beside the controlling one."""
+    return channel.removeprefix(STATE + "_").lower() if channel.startswith(STATE + "_") else None

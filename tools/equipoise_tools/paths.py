@@ -1,0 +1,27 @@
+"""Where the repository and its generated LCM types are."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+class UserError(Exception):
+    """Wrong input or set-up: one line for the user, exit status 2."""
+
+
+def repository_root() -> Path:
+    return Path(__file__).resolve().parents[2]
+
+
+def import_lcm_types():
+    """The generated Python package `equipoise`, from the host build unless it is installed."""
+    try:
+        import equipoise
+    except ModuleNotFoundError:
+        built = repository_root() / "build" / "host" / "lcm" / "python"
+        if not (built / "equipoise").is_dir():
+            raise UserError("the LCM types are not built; run ./tools/run or ./tools/test once") from None
+        sys.path.insert(0, str(built))
+        import equipoise
+    return equipoise

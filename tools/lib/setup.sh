@@ -1,0 +1,121 @@
+# Sourced by the commands in tools/: installs what is missing, makes the Python environment, builds.
+# Everything said here goes to stderr; stdout belongs to the command that was asked for.
+# shellcheck shell=bash
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+venv=$root/build/venv
+venv_python=$venv/bin/python
+jobs=$(nproc)
+
+say() { printf '%s\n' "$*" >&2; }
+die() {
+  say "error: $*"
+  exit 1
+}
+bad_usage() {
+  say "error: $*"
+  exit 2
+}
+
+# Ctrl-C: the child got the signal too and is cleaning up; leave with the conventional code, without a trace.
+trap 'trap - INT TERM; say ""; say "interrupted"; exit 130' INT
+trap 'trap - INT TERM; say "terminated"; exit 143' TERM
+
+as_root() {
+  if [ "$(id -u)" -eq 0 ]; then
+    "$@"
+  else
+    sudo "$@"
+  fi
+}
+
+# packages_of GROUP...: the names listed under [GROUP] in packages.txt.
+packages_of() {
+  awk -v groups=" $* " '
+    { sub(/#.*/, ""); gsub(/[ \t]/, "") }
+    /^\[.*\]$/ { wanted = index(groups, " " substr($0, 2, length($0) - 2) " ") > 0; next }
+    wanted && NF { print }' "$root/tools/packages.txt"
+}
+
+missing_of() {
+  local package
+  for package in "$@"; do
+    [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || printf '%s\n' "$package"
+  done
+}
+
+apt_get() {
+  # Own architecture only: a foreign one, if configured, must not be able to fail our update.
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -o APT::Architectures="$(dpkg --print-architecture)" \
+    -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300 "$@" >&2
+}
+
+# install_packages GROUP...: does not touch apt when nothing is missing, nor the network's package lists when the
+# ones at hand still serve.
+install_packages() {
+  local wanted missing
+  command -v apt-get >/dev/null || die "this is not a Debian system; install by hand what tools/packages.txt lists"
+  mapfile -t wanted < <(packages_of "$@")
+  mapfile -t missing < <(missing_of "${wanted[@]}")
+  [ "${#missing[@]}" -gt 0 ] || return 0
+  [ "$(id -u)" -eq 0 ] || command -v sudo >/dev/null ||
+    die "packages are missing and there is no sudo; as root: apt-get install ${missing[*]}"
+  say "Installing ${#missing[@]} Debian packages: ${missing[*]}"
+  [ -z "$(dpkg --audit)" ] || as_root dpkg --configure -a >&2 # an earlier installation was interrupted
+  if ! { compgen -G '/var/lib/apt/lists/*Packages*' >/dev/null &&
+    apt_get install -y --no-install-recommends "${missing[@]}"; }; then
+    say "Refreshing the package lists"
+    apt_get update || die "apt-get update failed; check the network and /etc/apt/sources.list"
+    apt_get install -y --no-install-recommends "${missing[@]}" ||
+      die "apt-get could not install: ${missing[*]}"
+  fi
+  touch "$root/build/packages.installed"
+}
+
+# ensure_venv: a Python environment under build/, remade when the requirements, the Python or the place changed.
+ensure_venv() {
+  local python=/usr/bin/python3 stamp=$venv/equipoise.stamp wanted site
+  [ -x "$python" ] || python=python3 # Debian's own: it is the one python3-venv belongs to
+  wanted=$({
+    printf '%s\n' "$root"
+    "$python" --version
+    cat "$root/tools/requirements.txt"
+  } | sha256sum)
+  [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ] && return 0
+  say "Making the Python environment in build/venv"
+  "$python" -m venv --clear "$venv" || die "could not make build/venv"
+  "$venv_python" -m pip install --quiet --disable-pip-version-check -r "$root/tools/requirements.txt" >&2 ||
+    die "pip could not install tools/requirements.txt; check the network and run again"
+  site=$("$venv_python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+  printf '%s\n' "$root/tools" "$root/build/host/lcm/python" >"$site/equipoise.pth"
+  printf '%s\n' "$wanted" >"$stamp"
+}
+
+# build PRESET [TARGET]...: configures when needed, then builds the targets (all without any).
+build() {
+  local preset=$1 target arguments=()
+  shift
+  for target in "$@"; do arguments+=(--target "$target"); done
+  # Once, and again when newly installed packages may have changed what CMake finds.
+  local configured=$root/build/$preset/equipoise.configured
+  if [ ! -f "$root/build/$preset/build.ninja" ] || [ ! -f "$configured" ] ||
+    [ "$root/CMakePresets.json" -nt "$configured" ] || [ "$root/build/packages.installed" -nt "$configured" ]; then
+    say "Configuring build/$preset"
+    (cd "$root" && cmake --preset "$preset" >&2) || die "cmake --preset $preset failed (see above)"
+    touch "$configured"
+  fi
+  say "Building build/$preset"
+  (cd "$root" && cmake --build "build/$preset" -j "$jobs" "${arguments[@]}" >&2) || die "the build failed (see above)"
+}
+
+# setup GROUP...: one at a time per tree, so that two commands started together do not install over each other.
+setup() {
+  mkdir -p "$root/build"
+  exec 8>"$root/build/.setup.lock"
+  flock -n 8 || { say "waiting for another command to finish its set-up in this tree" && flock 8; }
+  install_packages "$@"
+  ensure_venv
+  flock -u 8
+  exec 8>&-
+}
