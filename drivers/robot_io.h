@@ -1,13 +1,14 @@
-/* robot_io.h: the hardware boundary. A backend (board, mock, plant, lockstep socket, fault injector) is a table of
- * function pointers; the loop calls nothing else. In: device counts, straight from the chips, as double so that a
- * simulated device can be exact or deliver a NaN. Out: signed duty per motor. Every call returns 0 or -errno.
- * Real-time safe apart from close(), as far as the backend is. */
+/* robot_io.h: the hardware boundary. A backend (board, mock, plant, lockstep socket, fault injector) is a
+ * table of function pointers; the loop calls nothing else. In: device counts, straight from the chips, as
+ * double so that a simulated device can be exact or deliver a NaN. Out: signed duty per motor. Every call
+ * returns 0 or -errno. Real-time safe apart from close(), as far as the backend is. */
 #ifndef EQUIPOISE_DRIVERS_ROBOT_IO_H
 #define EQUIPOISE_DRIVERS_ROBOT_IO_H
 
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -38,14 +39,14 @@ enum rio_health {
 };
 
 typedef struct rio_sensors {
-  int64_t t_ns;                           /* CLOCK_MONOTONIC at the IMU's data-ready edge */
-  double gyro_counts[3];                  /* sensor axes, 16.4 counts per deg/s at +-2000 deg/s */
-  double accel_counts[3];                 /* sensor axes, specific force, 4096 counts per g at +-8 g */
-  double encoder_counts[RIO_MAX_MOTORS];  /* unwrapped, motor order */
-  double battery_counts;                  /* ADC counts */
-  double attitude_wxyz[4];                /* unit quaternion R_WS of the attitude source */
-  uint32_t valid;                         /* enum rio_valid */
-  uint32_t health;                        /* enum rio_health */
+  int64_t t_ns;                          /* CLOCK_MONOTONIC at the IMU's data-ready edge */
+  double gyro_counts[3];                 /* sensor axes, 16.4 counts per deg/s at +-2000 deg/s */
+  double accel_counts[3];                /* sensor axes, specific force, 4096 counts per g at +-8 g */
+  double encoder_counts[RIO_MAX_MOTORS]; /* unwrapped, motor order */
+  double battery_counts;                 /* ADC counts */
+  double attitude_wxyz[4];               /* unit quaternion R_WS of the attitude source */
+  uint32_t valid;                        /* enum rio_valid */
+  uint32_t health;                       /* enum rio_health */
 } rio_sensors_t;
 
 typedef struct rio_motors {
@@ -54,26 +55,30 @@ typedef struct rio_motors {
 } rio_motors_t;
 
 typedef struct rio_ops {
-  int (*wait_tick)(void *self, int64_t *now_ns); /* blocks until the next tick; -ESHUTDOWN: no more ticks */
-  int (*read_sensors)(void *self, rio_sensors_t *out);
-  int (*write_motors)(void *self, const rio_motors_t *command);
-  int (*motors_off)(void *self); /* must succeed from any state */
-  void (*close)(void *self);     /* motors off, then release */
+  int (*wait_tick)(void* self, int64_t* now_ns); /* blocks until the next tick; -ESHUTDOWN: no more ticks */
+  int (*read_sensors)(void* self, rio_sensors_t* out);
+  int (*write_motors)(void* self, const rio_motors_t* command);
+  int (*motors_off)(void* self); /* must succeed from any state */
+  void (*close)(void* self);     /* motors off, then release */
 } rio_ops_t;
 
 typedef struct rio {
-  const rio_ops_t *ops;
-  void *self;
+  const rio_ops_t* ops;
+  void* self;
 } rio_t;
 
-static inline int rio_wait_tick(const rio_t *io, int64_t *now_ns) { return io->ops->wait_tick(io->self, now_ns); }
+static inline int rio_wait_tick(const rio_t* io, int64_t* now_ns) {
+  return io->ops->wait_tick(io->self, now_ns);
+}
 
-static inline int rio_read_sensors(const rio_t *io, rio_sensors_t *out) { return io->ops->read_sensors(io->self, out); }
+static inline int rio_read_sensors(const rio_t* io, rio_sensors_t* out) {
+  return io->ops->read_sensors(io->self, out);
+}
 
-static inline int rio_motors_off(const rio_t *io) { return io->ops->motors_off(io->self); }
+static inline int rio_motors_off(const rio_t* io) { return io->ops->motors_off(io->self); }
 
 /* The last door before the motors: anything but a finite duty within +-1 turns them off and is an error. */
-static inline int rio_write_motors(const rio_t *io, const rio_motors_t *command) {
+static inline int rio_write_motors(const rio_t* io, const rio_motors_t* command) {
   for (int i = 0; i < RIO_MAX_MOTORS; ++i) {
     if (!isfinite(command->duty[i]) || fabs(command->duty[i]) > 1.0) {
       (void)io->ops->motors_off(io->self);
@@ -83,7 +88,7 @@ static inline int rio_write_motors(const rio_t *io, const rio_motors_t *command)
   return io->ops->write_motors(io->self, command);
 }
 
-static inline void rio_close(rio_t *io) {
+static inline void rio_close(rio_t* io) {
   if (io->ops != NULL) io->ops->close(io->self);
   io->ops = NULL;
   io->self = NULL;

@@ -1,0 +1,75 @@
+#include <errno.h>
+
+#include "button.h"
+#include "fake_gpio.hpp"
+#include "led.h"
+#include "syscall_journal.hpp"
+#include "testbed.hpp"
+
+namespace {
+class LedButtonTest : public Testbed {
+ protected:
+  void SetUp() override { FakeGpio::instance().clear(); }
+  const gpio_pin_t pin_ = {"gpio2", 2, false};
+};
+}  // namespace
+
+TEST_F(LedButtonTest, LedPrefersTheKernelsName) {
+  const std::string dir = addLed("red");
+  led_t led;
+  ASSERT_EQ(led_open(&led, "red", &pin_), 0);
+  EXPECT_EQ(FakeGpio::instance().heldLines(), 0);
+  ASSERT_EQ(led_set(&led, true), 0);
+  EXPECT_EQ(attribute(dir, "brightness"), "1");
+  led_close(&led);
+  EXPECT_EQ(attribute(dir, "brightness"), "0");
+}
+
+TEST_F(LedButtonTest, LedFallsBackToItsLine) {
+  led_t led;
+  ASSERT_EQ(led_open(&led, "red", &pin_), 0);
+  FakeGpio::Line& line = FakeGpio::instance().line("gpio2", 2);
+  EXPECT_TRUE(line.output && !line.active);
+  ASSERT_EQ(led_set(&led, true), 0);
+  EXPECT_TRUE(line.active);
+  led_close(&led);
+  EXPECT_FALSE(line.active || line.held);
+}
+
+TEST_F(LedButtonTest, LedReportsWhatIsMissing) {
+  led_t led;
+  EXPECT_EQ(led_open(&led, "red", nullptr), -ENOENT);
+  EXPECT_EQ(led_open(&led, nullptr, nullptr), -ENODEV);
+  FakeGpio::instance().line("gpio2", 2).open_error = -EBUSY;
+  EXPECT_EQ(led_open(&led, "red", &pin_), -EBUSY);
+}
+
+TEST(ButtonFilter, ReportsAPressOnceAndIgnoresBounce) {
+  button_filter_t filter{};
+  filter.stable_polls = 3;
+  const std::vector<bool> levels = {0, 1, 0, 1, 1, 0, 1, 1, 1, 1, 1, 0, 1, 1, 0, 0, 0, 1, 1, 1};
+  std::vector<size_t> presses;
+  for (size_t i = 0; i < levels.size(); ++i) {
+    if (button_filter_update(&filter, levels[i])) presses.push_back(i);
+  }
+  EXPECT_EQ(presses, (std::vector<size_t>{8, 19}));
+}
+
+TEST_F(LedButtonTest, ButtonReadsItsLine) {
+  const gpio_pin_t pin = {"gpio2", 5, true};
+  button_t button;
+  ASSERT_EQ(button_open(&button, &pin, 2), 0);
+  FakeGpio::Line& line = FakeGpio::instance().line("gpio2", 5);
+  EXPECT_TRUE(line.active_low && !line.output);
+  bool pressed = false;
+  line.active = true;
+  ASSERT_EQ(button_poll(&button, &pressed), 0);
+  EXPECT_FALSE(pressed);
+  ASSERT_EQ(button_poll(&button, &pressed), 0);
+  EXPECT_TRUE(pressed);
+  line.use_error = -ENODEV;
+  EXPECT_EQ(button_poll(&button, &pressed), -ENODEV);
+  EXPECT_FALSE(pressed);
+  button_close(&button);
+  EXPECT_FALSE(line.held);
+}

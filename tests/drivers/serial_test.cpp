@@ -1,0 +1,73 @@
+// Against a real pseudo terminal: the kernel's line discipline is what the settings are about.
+#include "serial.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <string>
+
+namespace {
+class SerialTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    master_ = posix_openpt(O_RDWR | O_NOCTTY);
+    ASSERT_GE(master_, 0);
+    ASSERT_EQ(grantpt(master_), 0);
+    ASSERT_EQ(unlockpt(master_), 0);
+    path_ = ptsname(master_);
+  }
+  void TearDown() override {
+    serial_close(&serial_);
+    if (master_ >= 0) close(master_);
+  }
+  int master_ = -1;
+  std::string path_;
+  serial_t serial_{-1};
+};
+}  // namespace
+
+TEST_F(SerialTest, Is8N1RawAtTheRateAskedFor) {
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
+  termios settings;
+  ASSERT_EQ(tcgetattr(serial_.fd, &settings), 0);
+  EXPECT_EQ(cfgetispeed(&settings), speed_t{B9600});
+  EXPECT_EQ(cfgetospeed(&settings), speed_t{B9600});
+  EXPECT_EQ(settings.c_cflag & (CSIZE | PARENB | CSTOPB | CRTSCTS), tcflag_t{CS8});
+  EXPECT_EQ(settings.c_lflag & (ICANON | ECHO | ISIG), 0u);
+}
+
+TEST_F(SerialTest, PassesEveryByteUnchangedBothWays) {
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 115200), 0);
+  uint8_t all[256];
+  for (int i = 0; i < 256; ++i) all[i] = static_cast<uint8_t>(i);
+  ASSERT_EQ(write(master_, all, sizeof all), ssize_t{256});
+  std::string got;
+  uint8_t chunk[64];
+  for (int n; (n = serial_read(&serial_, chunk, sizeof chunk)) > 0;) got.append(chunk, chunk + n);
+  EXPECT_EQ(got, std::string(all, all + 256));
+  ASSERT_EQ(serial_write(&serial_, all, sizeof all), 256);
+  uint8_t back[256];
+  ASSERT_EQ(read(master_, back, sizeof back), ssize_t{256});
+  EXPECT_EQ(std::string(back, back + 256), std::string(all, all + 256));
+}
+
+TEST_F(SerialTest, NothingThereIsNotTheEnd) {
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
+  uint8_t byte;
+  EXPECT_EQ(serial_read(&serial_, &byte, 1), -EAGAIN);
+  close(master_);
+  master_ = -1;
+  EXPECT_EQ(serial_read(&serial_, &byte, 1), -EIO);
+  EXPECT_EQ(serial_write(&serial_, &byte, 1), -EIO);
+}
+
+TEST_F(SerialTest, ReportsBadRateMissingDeviceAndNoTerminal) {
+  EXPECT_EQ(serial_open(&serial_, path_.c_str(), 9601), -EINVAL);
+  EXPECT_EQ(serial_open(&serial_, "/dev/nonexistent", 9600), -ENOENT);
+  EXPECT_EQ(serial_open(&serial_, "/dev/null", 9600), -ENOTTY);
+  EXPECT_EQ(serial_.fd, -1);
+}

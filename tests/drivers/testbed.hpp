@@ -1,0 +1,46 @@
+// A BeagleBone's /sys and /dev in a temporary directory (umockdev), one per test. In: which devices exist.
+// Out: what the drivers wrote to their attributes. The I2C bus answers through FakeImu.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <umockdev.h>
+
+#include <map>
+#include <string>
+
+#include "fake_imu.hpp"
+
+class Testbed : public ::testing::Test {
+ protected:
+  Testbed();
+  ~Testbed() override;
+
+  // Each returns the attribute directory below /sys, usable with attribute() and setAttribute().
+  std::string addPwm(const std::string& address, int chip, bool beagle_names = false);
+  std::string addCounter(const std::string& address, int number);
+  std::string addLegacyEqep(const std::string& address);
+  std::string addAdc(const std::string& name, int number);
+  std::string addLed(const std::string& name);
+  void addImu(int bus = 2);
+  void addBoard();  // all a robot with three motors needs
+
+  std::string attribute(const std::string& dir, const std::string& name) const;  // first line
+  void setAttribute(const std::string& dir, const std::string& name, const std::string& value);
+  void removeAttribute(const std::string& dir, const std::string& name);
+  void removeDevice(const std::string& dir);
+  std::string writeFile(const std::string& name, const std::string& content);  // path for open()
+
+  FakeImu imu;
+  bool plain_i2c = true;  // what I2C_FUNCS promises
+
+ private:
+  static gboolean onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
+  std::string addDevice(const std::string& subsystem, const std::string& path,
+                        const std::map<std::string, std::string>& attributes);
+  std::string hostPath(const std::string& path) const;
+
+  UMockdevTestbed* testbed_;
+  UMockdevIoctlBase* ioctl_ = nullptr;
+  std::string bus_node_;
+  std::string scratch_;
+};
