@@ -45,6 +45,9 @@ typedef struct dmp {
   enum dmp_state state;
   unsigned wait_ticks;
   unsigned soft_resets;
+  unsigned ticks_since_good;
+  bool has_last;
+  double last_wxyz[4];
 } dmp_t;
 
 /* Loads, verifies (-EILSEQ: read-back differs) and starts. Takes about 0.3 s at 400 kHz. */

@@ -100,6 +100,6 @@ void BoardFixture::expectMotorsOff() {
   EXPECT_EQ(duties(), (std::vector<std::string>{"0", "0", "0"}));
   EXPECT_FALSE(enableLine().active);
   for (const auto& [key, line] : FakeGpio::instance().lines()) {
-    if (line.output) EXPECT_FALSE(line.active) << key.first << ":" << key.second;
+    EXPECT_FALSE(line.output && line.active) << key.first << ":" << key.second;
   }
 }

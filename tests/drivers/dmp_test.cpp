@@ -87,7 +87,7 @@ TEST(DmpParse, RefusesOtherLengths) {
 TEST(DmpParse, RefusesEveryMisalignmentOfAPacketStream) {
   std::vector<uint8_t> stream;
   for (int i = 0; i < 2; ++i) {
-    const auto one = dmpPacket({0.8, 0.36, -0.48, 0.0});
+    const auto one = dmpPacket({0.5, 0.5, -0.5, 0.5});
     stream.insert(stream.end(), one.begin(), one.end());
   }
   dmp_packet_t packet;
@@ -186,6 +186,36 @@ TEST_F(DmpTest, RefusesATornPacketAndResetsTheFifo) {
   EXPECT_EQ(dmp_poll(&dmp_, &packet_), -EBADMSG);
   EXPECT_EQ(packet_.attitude_wxyz[0], 42) << "neither the torn packet nor the stale one before it";
   EXPECT_EQ(imu.fifoSize(), 0);
+}
+
+TEST_F(DmpTest, RefusesAShiftedStreamThatPassesTheNormTest) {
+  start();
+  const auto upright = dmpPacket({1, 0, 0, 0});
+  for (const int shift : {4, 8, 12, 16}) {
+    imu.pushFifo(upright);
+    ASSERT_EQ(dmp_poll(&dmp_, &packet_), 0);
+    std::vector<uint8_t> stream = upright;
+    stream.insert(stream.end(), upright.begin(), upright.end());
+    stream.erase(stream.begin(), stream.begin() + shift);
+    stream.resize(20);
+    imu.pushFifo(stream);
+    EXPECT_EQ(dmp_poll(&dmp_, &packet_), -EBADMSG) << shift;
+    EXPECT_EQ(dmp_poll(&dmp_, &packet_), -EBUSY);
+  }
+}
+
+TEST_F(DmpTest, FollowsTheFastestTurnTheGyroCanMeasure) {
+  start();
+  const double step_rad = 2000.0 * M_PI / 180.0 * 0.005;
+  for (int i = 0; i < 200; ++i) {
+    imu.pushFifo(dmpPacket({std::cos(i * step_rad / 2), 0, 0, std::sin(i * step_rad / 2)}));
+    ASSERT_EQ(dmp_poll(&dmp_, &packet_), 0) << i;
+    if (i % 7 == 0) {  // some packets are late
+      EXPECT_EQ(dmp_poll(&dmp_, &packet_), -EAGAIN);
+      EXPECT_EQ(dmp_poll(&dmp_, &packet_), -EAGAIN);
+      i += 2;
+    }
+  }
 }
 
 TEST_F(DmpTest, RestartsTheDmpWhenFifoResetsDoNotHelpAndKeepsTheInterruptAlive) {

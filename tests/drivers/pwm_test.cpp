@@ -2,6 +2,8 @@
 
 #include <errno.h>
 
+#include <cmath>
+
 #include "syscall_journal.hpp"
 #include "testbed.hpp"
 

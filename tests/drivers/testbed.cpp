@@ -150,9 +150,9 @@ gboolean Testbed::onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpoin
   UMockdevIoctlData* arg = umockdev_ioctl_client_get_arg(client);
   const auto request = static_cast<uint32_t>(umockdev_ioctl_client_get_request(client));
   if (request == I2C_FUNCS) {
-    const unsigned long functions = self.plain_i2c ? I2C_FUNC_I2C : I2C_FUNC_SMBUS_BYTE;
+    unsigned long functions = self.plain_i2c ? I2C_FUNC_I2C : I2C_FUNC_SMBUS_BYTE;
     const auto out = resolve(arg, 0, sizeof functions);
-    umockdev_ioctl_data_update(out.get(), 0, reinterpret_cast<const guint8*>(&functions), sizeof functions);
+    umockdev_ioctl_data_update(out.get(), 0, reinterpret_cast<guint8*>(&functions), sizeof functions);
     umockdev_ioctl_client_complete(client, 0, 0);
     return TRUE;
   }
