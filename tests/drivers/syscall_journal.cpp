@@ -55,18 +55,18 @@ std::string describe(const std::string& path, const void* data, size_t size) {
 }  // namespace
 
 extern "C" {
-ssize_t __real_pread(int fd, void* data, size_t size, off_t at);
-ssize_t __real_pwrite(int fd, const void* data, size_t size, off_t at);
+ssize_t __real_pread64(int fd, void* data, size_t size, off64_t at);
+ssize_t __real_pwrite64(int fd, const void* data, size_t size, off64_t at);
 
-ssize_t __wrap_pread(int fd, void* data, size_t size, off_t at) {
+ssize_t __wrap_pread64(int fd, void* data, size_t size, off64_t at) {
   int error = 0;
   if (!SyscallJournal::instance().takeFailure(false, pathOf(fd), &error))
-    return __real_pread(fd, data, size, at);
+    return __real_pread64(fd, data, size, at);
   errno = error;
   return error == 0 ? 0 : -1;
 }
 
-ssize_t __wrap_pwrite(int fd, const void* data, size_t size, off_t at) {
+ssize_t __wrap_pwrite64(int fd, const void* data, size_t size, off64_t at) {
   const std::string path = pathOf(fd);
   int error = 0;
   if (SyscallJournal::instance().takeFailure(true, path, &error)) {
@@ -74,6 +74,6 @@ ssize_t __wrap_pwrite(int fd, const void* data, size_t size, off_t at) {
     return error == 0 ? 0 : -1;
   }
   SyscallJournal::instance().note(describe(path, data, size));
-  return __real_pwrite(fd, data, size, at);
+  return __real_pwrite64(fd, data, size, at);
 }
 }
