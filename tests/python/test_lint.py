@@ -91,8 +91,14 @@ def test_law_keeps_the_operating_system_out_of_core(tmp_path, name, header):
 
 @pytest.mark.parametrize(
     "header",
-    ["equipoise/types.hpp", "equipoise/samples.hpp", "equipoise/robots/mbbr.hpp", "generated/mbbr_gains.hpp"]
-    + ["equipoise/estimate/joseph.hpp", "equipoise/config/ekf.hpp"],
+    [
+        "equipoise/types.hpp",
+        "equipoise/samples.hpp",
+        "equipoise/robots/mbbr.hpp",
+        "generated/mbbr_gains.hpp",
+        "equipoise/estimate/joseph.hpp",
+        "equipoise/config/ekf.hpp",
+    ],
 )
 def test_law_lets_a_stage_know_values_robots_and_its_own_room(tmp_path, header):
     assert not law.law(planted(tmp_path, **{STAGE: f'#include <Eigen/Core>\n#include "{header}"\n'}))

@@ -19,7 +19,7 @@ _LARGEST_MESSAGE = 1 << 24
 
 
 class Log(dict):
-    """Channel -> record array (one entry per message, a field per LCM field), and what was wrong with the file."""
+    """Channel -> record array (an entry per message, a field per LCM field); `notes`: what was wrong."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()

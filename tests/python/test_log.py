@@ -1,0 +1,118 @@
+"""read_log: all of an intact log, the intact part of a damaged one, and clear words about the rest."""
+
+import struct
+
+import equipoise
+import numpy as np
+import pytest
+from equipoise_tools.lcm_types import message_types
+from equipoise_tools.log import read_log
+from equipoise_tools.paths import UserError
+
+import lcm
+
+
+def small_log(path, ticks=20, more=()):
+    """States of consecutive ticks, then `more` (channel, bytes) pairs."""
+    log = lcm.EventLog(str(path), "w", overwrite=True)
+    for tick in range(ticks):
+        state = equipoise.state_t()
+        state.utime, state.tick = 1_000_000 + 5000 * tick, tick
+        state.theta_rad = [0.1 * tick, 0.2, 0.3]
+        log.write_event(state.utime, "EQUIPOISE_STATE", state.encode())
+    for channel, data in more:
+        log.write_event(2_000_000, channel, data)
+    log.close()
+    return path
+
+
+def event_bytes(path, ticks):
+    size = path.stat().st_size
+    assert size % ticks == 0
+    return size // ticks
+
+
+def test_every_type_has_the_layout_that_the_generated_code_encodes():
+    for kind in message_types().values():
+        if kind.layout is not None:
+            assert len(getattr(equipoise, kind.name)().encode()) == 8 + kind.layout.itemsize, kind.name
+    assert {"sensors_t", "command_t", "state_t", "motors_t", "health_t", "timing_t", "run_t"} <= {
+        kind.name for kind in message_types().values()
+    }
+
+
+def test_an_intact_log_is_read_whole(tmp_path):
+    log = read_log(small_log(tmp_path / "a.lcm"))
+    state = log["EQUIPOISE_STATE"]
+    assert log.notes == []
+    assert state["tick"].tolist() == list(range(20))
+    assert state["theta_rad"].shape == (20, 3)
+    np.testing.assert_array_equal(state["theta_rad"][:, 0], 0.1 * np.arange(20))
+    np.testing.assert_allclose(log.seconds("EQUIPOISE_STATE"), 0.005 * np.arange(20))
+    assert state["theta_rad"].dtype.isnative
+
+
+def test_values_agree_with_the_generated_decoder(known_log):
+    log = read_log(known_log)
+    rows = {}
+    for event in lcm.EventLog(str(known_log)):
+        i = rows[event.channel] = rows.get(event.channel, -1) + 1
+        if i != 1234 or event.channel == "EQUIPOISE_RUN":
+            continue
+        record = log[event.channel][i]
+        decoded = message_types()[event.data[:8]].decode(event.data)
+        for name in record.dtype.names:
+            np.testing.assert_array_equal(
+                record[name], getattr(decoded, name), err_msg=f"{event.channel}.{name}"
+            )
+    assert {channel: records.size for channel, records in log.items()} == {c: i + 1 for c, i in rows.items()}
+
+
+@pytest.mark.parametrize("missing", [1, 40, 150])
+def test_a_cut_off_log_is_read_up_to_the_cut(tmp_path, missing):
+    path = small_log(tmp_path / "a.lcm")
+    whole = event_bytes(path, 20)
+    assert missing < whole
+    path.write_bytes(path.read_bytes()[:-missing])
+    log = read_log(path)
+    assert log["EQUIPOISE_STATE"]["tick"].tolist() == list(range(19))
+    assert len(log.notes) == 1
+    assert f"cut off after {19 * whole} of {20 * whole - missing} bytes" in log.notes[0]
+
+
+def test_a_damaged_event_is_left_out_and_reading_goes_on(tmp_path):
+    path = small_log(tmp_path / "a.lcm")
+    whole = event_bytes(path, 20)
+    data = bytearray(path.read_bytes())
+    data[5 * whole : 5 * whole + 4] = b"\0\0\0\0"  # the sync word of event 5
+    struct.pack_into(">I", data, 9 * whole + 24, 0xFFFFFFFF)  # the message length of event 9
+    path.write_bytes(data)
+    log = read_log(path)
+    assert log["EQUIPOISE_STATE"]["tick"].tolist() == [*range(5), *range(6, 9), *range(10, 20)]
+    assert log.notes == [f"{whole} bytes at {n * whole} are damaged and left out" for n in (5, 9)]
+
+
+def test_foreign_messages_are_counted_not_misread(tmp_path):
+    log = read_log(small_log(tmp_path / "a.lcm", more=[("OTHER", b"12345678 something else")]))
+    assert list(log) == ["EQUIPOISE_STATE"]
+    assert log.notes == ["channel OTHER: 1 messages of an unknown type or version are left out"]
+
+
+def test_a_message_of_wrong_length_costs_its_channel_not_the_log(tmp_path):
+    torn = equipoise.state_t().encode()[:-3]
+    log = read_log(small_log(tmp_path / "a.lcm", more=[("EQUIPOISE_TRUTH", torn)]))
+    assert list(log) == ["EQUIPOISE_STATE"]
+    assert "EQUIPOISE_TRUTH is left out" in log.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [(b"", "is not an LCM event log"), (b"PNG and so on", "is not an LCM event log"), (None, "No such file")],
+)
+def test_what_is_no_log_is_refused_by_name(tmp_path, content, complaint):
+    path = tmp_path / "b.lcm"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(UserError, match=complaint) as error:
+        read_log(path)
+    assert str(path) in str(error.value)

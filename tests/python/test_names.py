@@ -1,0 +1,33 @@
+"""The words for the firmware's numbers follow the C++ and C headers, where these exist."""
+
+import re
+
+import pytest
+from equipoise_tools import names
+
+
+def enumerators(text: str, enum: str) -> list[tuple[str, int]]:
+    """(words, value) of the enum's members; a bit counts by its position."""
+    body = re.search(rf"enum (?:class )?{enum}\b[^{{]*\{{(.*?)\}}", text, re.S)[1]
+    members = re.findall(r"\b(?:k|RIO_)(\w+)\s*=\s*(?:1u\s*<<\s*)?(\d+)", body)
+    spaced = [(re.sub(r"(?<=[a-z])(?=[A-Z])|_", " ", name).lower(), int(value)) for name, value in members]
+    return sorted(spaced, key=lambda member: member[1])
+
+
+@pytest.mark.parametrize(
+    ("header", "enum", "words"),
+    [
+        ("include/equipoise/actuate/safety.hpp", "ArmState", names.ARM_STATES),
+        ("include/equipoise/actuate/safety.hpp", "SafetyReason", names.SAFETY_REASONS),
+        ("drivers/robot_io.h", "rio_health", names.SENSOR_HEALTH),
+    ],
+)
+def test_words_follow_the_headers(root, header, enum, words):
+    assert enumerators((root / header).read_text(), enum) == [(word, i) for i, word in enumerate(words)]
+
+
+def test_bits_without_a_word_are_named_by_number():
+    assert names.bits(0b101, ("a", "b")) == ["a", "bit 2"]
+    assert names.arm_state(9) == "state 9"
+    assert names.estimator_of("EQUIPOISE_STATE_EKF13_PUBLISHED") == "ekf13_published"
+    assert names.estimator_of("EQUIPOISE_STATE") is None

@@ -1,0 +1,143 @@
+"""The report finds in a known log what was put there, and draws it."""
+
+import base64
+import re
+
+import equipoise_tools.figures as figures
+import matplotlib.image
+import numpy as np
+import pytest
+import synthetic
+from equipoise_tools import names, report
+from equipoise_tools.log import read_log
+from equipoise_tools.metrics import summarise
+
+
+@pytest.fixture(scope="module")
+def log(known_log):
+    return read_log(known_log)
+
+
+@pytest.fixture(scope="module")
+def summary(log):
+    return summarise(log)
+
+
+def test_errors_against_truth_are_those_put_in(summary):
+    assert list(summary.estimators) == ["ekf", "ekf13"]
+    ekf, ekf13 = summary.estimators.values()
+    assert ekf.attitude_rmse_rad == pytest.approx(synthetic.ATTITUDE_ERROR_RAD, rel=1e-12)
+    assert ekf13.attitude_rmse_rad == pytest.approx(
+        synthetic.OTHER_FACTOR * synthetic.ATTITUDE_ERROR_RAD, rel=1e-12
+    )
+    assert ekf.speed_rmse_m_s == pytest.approx(synthetic.RATE_ERROR_RAD_S * synthetic.RADIUS_M, rel=1e-12)
+    assert summary.position_rmse_m == pytest.approx(synthetic.POSITION_ERROR_M, rel=1e-12)
+
+
+def test_motion_duty_and_timing_are_those_put_in(summary):
+    assert summary.robot == "mbbr"
+    assert summary.ticks == 2000
+    assert summary.duration_s == pytest.approx(9.995)
+    assert summary.yaw_rate_mean_hz == pytest.approx(synthetic.YAW_HZ)
+    assert summary.duty_max == 0.75
+    assert summary.saturated_fraction == 0.25
+    assert summary.compute_us == pytest.approx((2.0, 2.0, 9.0))
+    assert (summary.overruns, summary.dropped_records) == (3, 4)
+    assert summary.armed_s == pytest.approx(9.5, abs=0.01)
+    assert summary.fell_at_s is None
+
+
+def test_the_permission_to_move_is_told_in_words(tmp_path):
+    summary = summarise(read_log(synthetic.write_log(tmp_path / "fall.lcm", fall_at_s=8.0)))
+    assert summary.fell_at_s == pytest.approx(8.0)
+    assert summary.events == [(0.0, "disarmed, not requested"), (0.5, "armed"), (8.0, "fault, tilt")]
+
+
+def test_the_drive_phase_is_the_commanded_one(log):
+    ((start, end),) = figures.drive_phases(log)
+    assert (start, end) == pytest.approx((synthetic.DRIVE_FROM_S, synthetic.DRIVE_TO_S))
+
+
+def test_ball_speed_is_the_slope_of_the_position(log):
+    speed = figures.velocity_W_m_s(log, names.TRUTH)
+    t_s = log.seconds(names.TRUTH)
+    driving = (t_s > 6.1) & (t_s < 8.9)
+    np.testing.assert_allclose(speed[driving], [[synthetic.DRIVE_M_S, 0.0]] * driving.sum(), atol=1e-9)
+    assert not speed[t_s < 5.9].any()
+
+
+def test_smoothing_neither_shifts_nor_scales():
+    t_s = np.arange(0, 60, 0.005)
+    slow = np.sin(0.5 * t_s)  # far below 10 rad/s: passes
+    fast = np.sin(100 * t_s)  # far above: the mean of both ways is 1 / (1 + (100 / 10)^2)
+    inner = (t_s > 10) & (t_s < 50)
+    np.testing.assert_allclose(figures.smoothed(slow, 0.005)[inner], slow[inner], atol=0.01)
+    assert np.abs(figures.smoothed(fast, 0.005)[inner]).max() == pytest.approx(1 / 101, rel=0.1)
+    np.testing.assert_allclose(figures.smoothed(np.full(50, 3.0), 0.005), 3.0)
+
+
+def test_the_command_writes_a_picture_and_a_page_that_stands_alone(known_log, tmp_path, capsys):
+    assert report.main([str(known_log), "--out", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"^ekf +0\.00300 +2\.000$", printed, re.M)
+    assert re.search(r"^ekf13 +0\.01500 +10\.000$", printed, re.M)
+    assert "mean yaw rate:                  0.500 Hz" in printed
+    picture = matplotlib.image.imread(tmp_path / "out" / "report.png")
+    assert picture.shape[1] > 1000
+    assert picture[..., :3].std() > 0.05  # something is drawn
+    page = (tmp_path / "out" / "report.html").read_text()
+    (embedded,) = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
+    assert base64.b64decode(embedded) == (tmp_path / "out" / "report.png").read_bytes()
+    assert not re.search(r'(?:src|href)="(?!data:)', page)
+    for number in ("0.00300", "10.000", "upright to the end", "0.750", "ab" * 32):
+        assert number in page
+
+
+def titles(path):
+    log = read_log(path)
+    figure = figures.draw_report(log, summarise(log))
+    found = [axes.get_title(loc="left") for axes in figure.axes]
+    figures.plt.close(figure)
+    return found
+
+
+def test_panels_follow_the_robot(known_log, tmp_path):
+    mbbr = titles(known_log)
+    assert mbbr[:2] == ["Tilt about x, $\\theta_x$", "Tilt about y, $\\theta_y$"]
+    assert {"Ball speed along x", "Ball position y", "Track on the floor", "Yaw rate", "Duty"} <= set(mbbr)
+    mip = titles(synthetic.write_log(tmp_path / "mip.lcm", robot="mip"))
+    assert mip[:2] == ["Lean, $\\theta$", "Wheel speed"]
+    assert "Wheel speed error (smoothed)" in mip
+    assert not any("Ball" in title or "about y" in title for title in mip)
+
+
+def test_a_cut_off_log_is_reported_with_a_note(known_log, tmp_path, capsys):
+    cut = tmp_path / "cut.lcm"
+    cut.write_bytes(known_log.read_bytes()[:-777])
+    assert report.main([str(cut)]) == 0
+    assert "note: cut off after" in capsys.readouterr().out
+    assert "cut off after" in (tmp_path / "report.html").read_text()
+
+
+def test_a_log_of_a_real_robot_has_no_truth_and_still_reports(known_log, tmp_path, capsys):
+    import lcm
+
+    path = tmp_path / "robot.lcm"
+    out = lcm.EventLog(str(path), "w")
+    for event in lcm.EventLog(str(known_log)):
+        if event.channel not in (names.TRUTH, names.RUN):
+            out.write_event(event.timestamp, event.channel, event.data)
+    out.close()
+    assert report.main([str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "RMSE" not in printed
+    assert "mean yaw rate:                  0.500 Hz" in printed
+
+
+def test_user_errors_are_one_line_and_status_2(tmp_path, capsys, known_log):
+    assert report.main([str(tmp_path / "none.lcm")]) == 2
+    assert capsys.readouterr().err == f"error: {tmp_path}/none.lcm: No such file or directory\n"
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert report.main([str(known_log), "--out", str(blocked)]) == 2
+    assert capsys.readouterr().err.startswith(f"error: {blocked}")

@@ -1,0 +1,94 @@
+"""The report as one HTML file that needs nothing else: pictures inside it, numbers as tables."""
+
+from __future__ import annotations
+
+import base64
+from html import escape
+
+from .log import Log
+from .metrics import Summary, run_record
+
+_STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1200px; margin: 2rem auto; }
+h1 { font-size: 1.4rem; margin-bottom: 0.2rem; } h2 { font-size: 1.05rem; margin-top: 1.6rem; }
+table { border-collapse: collapse; margin: 0.4rem 0; }
+th, td { text-align: left; padding: 0.2rem 1.4rem 0.2rem 0; border-bottom: 1px solid #e3e3e3; }
+th { font-weight: 600; color: #555; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
+img { width: 100%; height: auto; }
+.note { background: #fff4e5; border-left: 4px solid #D55E00; padding: 0.4rem 0.8rem; }
+.fine { color: #777; font-size: 0.85rem; overflow-wrap: anywhere; }
+"""
+
+
+def _table(rows: list[tuple[str, ...]], head: tuple[str, ...] = ()) -> str:
+    def cell(index: int, text: str) -> str:
+        return f'<td{" class=number" if index else ""}>{escape(text)}</td>'
+
+    lines = ["<table>"]
+    if head:
+        lines.append("<tr>" + "".join(f"<th>{escape(text)}</th>" for text in head) + "</tr>")
+    lines += ["<tr>" + "".join(cell(i, text) for i, text in enumerate(row)) + "</tr>" for row in rows]
+    return "\n".join([*lines, "</table>"])
+
+
+def number_rows(summary: Summary) -> list[tuple[str, str]]:
+    """What the page's first table and the terminal say."""
+    upright = summary.fell_at_s is None
+    rows = [
+        ("outcome", "upright to the end" if upright else f"fell at {summary.fell_at_s:.2f} s"),
+        ("duration", f"{summary.duration_s:.2f} s, {summary.ticks} ticks, armed {summary.armed_s:.2f} s"),
+    ]
+    if summary.yaw_rate_mean_hz is not None:
+        rows.append(("mean yaw rate", f"{summary.yaw_rate_mean_hz:.3f} Hz"))
+    if summary.position_rmse_m is not None:
+        rows.append(("position error, RMS", f"{100 * summary.position_rmse_m:.2f} cm"))
+    if summary.duty_max is not None:
+        rows.append(("largest duty", f"{summary.duty_max:.3f}"))
+        rows.append(("ticks with a saturated motor", f"{100 * summary.saturated_fraction:.2f} %"))
+    if summary.battery_V is not None:
+        rows.append(
+            ("battery, lowest and mean", f"{summary.battery_V[0]:.2f} V, {summary.battery_V[1]:.2f} V")
+        )
+    if summary.compute_us is not None:
+        rows.append(
+            ("tick, median / 99 % / longest", " / ".join(f"{us:.1f}" for us in summary.compute_us) + " µs")
+        )
+        rows.append(("overruns, records lost", f"{summary.overruns}, {summary.dropped_records}"))
+    return rows
+
+
+def estimator_rows(summary: Summary) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """(head, rows) of the estimators' errors against the truth; the controlling one first."""
+    in_metres = all(errors.speed_rmse_m_s is not None for errors in summary.estimators.values())
+    head = ("estimator", "attitude RMSE (rad)", "speed RMSE (cm/s)" if in_metres else "speed RMSE (rad/s)")
+    rows = []
+    for name, errors in summary.estimators.items():
+        speed = 100 * errors.speed_rmse_m_s if in_metres else errors.rolling_rmse_rad_s
+        rows.append((name, f"{errors.attitude_rmse_rad:.5f}", f"{speed:.3f}"))
+    return head, rows
+
+
+def page(title: str, log: Log, summary: Summary, pictures: list[bytes]) -> str:
+    parts = [
+        "<!doctype html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
+        f"<h1>{escape(title)}</h1>",
+    ]
+    parts += [f'<p class="note">{escape(note)}</p>' for note in log.notes]
+    parts.append(_table(number_rows(summary)))
+    if summary.estimators:
+        head, rows = estimator_rows(summary)
+        parts += ["<h2>Estimators against the simulation's truth</h2>", _table(rows, head)]
+    for picture in pictures:
+        data = base64.b64encode(picture).decode()
+        parts.append(f'<p><img alt="{escape(title)}" src="data:image/png;base64,{data}"></p>')
+    if summary.events:
+        rows = [(f"{t_s:.3f} s", what) for t_s, what in summary.events]
+        parts += ["<h2>Motors' permission</h2>", _table(rows, ("time", "state and reasons"))]
+    run = run_record(log)
+    source = f"{log.path.name}"
+    if run is not None:
+        source += f" · equipoise {run.version} · configuration SHA-256 {run.config_sha256}"
+    parts += [f'<p class="fine">{escape(source)}</p>', "</body></html>"]
+    return "\n".join(parts) + "\n"

@@ -1,0 +1,50 @@
+"""One look for every picture: colours that colour-blind readers tell apart (Okabe and Ito), thin axes."""
+
+from __future__ import annotations
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+TRUTH = "#000000"
+REFERENCE = "#D55E00"
+ESTIMATE = "#0072B2"
+OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F", "#8B6B3E")
+DASHES = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (6, 2, 1, 2, 1, 2)), (0, (8, 2)))
+DRIVE_PHASE = "#0072B2"
+
+RC = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#666666",
+    "axes.grid": True,
+    "grid.color": "#E3E3E3",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "figure.facecolor": "white",
+    "savefig.dpi": 130,
+}
+
+
+def colour(index: int) -> str:
+    """Of the index-th estimator; the controlling one is the first."""
+    return ESTIMATE if index == 0 else OTHERS[(index - 1) % len(OTHERS)]
+
+
+def dash(index: int):
+    return DASHES[index % len(DASHES)]
+
+
+def styled():
+    return plt.rc_context(RC)
