@@ -97,7 +97,6 @@ def test_law_keeps_the_operating_system_out_of_core(tmp_path, name, header):
         "equipoise/robots/mbbr.hpp",
         "generated/mbbr_gains.hpp",
         "equipoise/estimate/joseph.hpp",
-        "equipoise/config/ekf.hpp",
     ],
 )
 def test_law_lets_a_stage_know_values_robots_and_its_own_room(tmp_path, header):
@@ -105,7 +104,7 @@ def test_law_lets_a_stage_know_values_robots_and_its_own_room(tmp_path, header):
 
 
 @pytest.mark.parametrize(
-    "header", ["equipoise/control/slc.hpp", "equipoise/plant/world.hpp", "equipoise/pipeline.hpp"]
+    "header", ["equipoise/control/slc.hpp", "equipoise/plant/world.hpp", "equipoise/config.hpp"]
 )
 def test_law_keeps_other_rooms_out_of_a_stage(tmp_path, header):
     findings = law.law(planted(tmp_path, **{STAGE: f'#include "{header}"\n'}))
