@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-2.0
+/* MPU-9250 at address 0x68 of /dev/i2c-2: register file, reset, DMP memory, FIFO of 1024 bytes. */
+#include <linux/fs.h>
+#include <linux/i2c.h>
+#include <linux/module.h>
+#include <linux/uaccess.h>
+
+#include "bench.h"
+
+enum { ADDRESS = 0x68, FIFO_BYTES = 1024, DMP_BYTES = 4096 };
+enum {
+	SAMPLE = 0x3b, SAMPLE_BYTES = 14, USER_CTRL = 0x6a, POWER = 0x6b, BANK = 0x6d, OFFSET = 0x6e, DATA = 0x6f,
+	FIFO_COUNT_H = 0x72, FIFO_COUNT_L = 0x73, FIFO = 0x74, WHO_AM_I = 0x75
+};
+
+static u8 reg[128], pointer, who_am_i = 0x71;
+static u8 sample[SAMPLE_BYTES]; /* what the sensor measures; the registers show it while it is awake */
+static u8 dmp[DMP_BYTES];
+static u8 fifo[FIFO_BYTES];
+static unsigned int fifo_head, fifo_size;
+static u32 transfers;
+static struct bench_fault fault;
+
+static void reset(void)
+{
+	memset(reg, 0, sizeof(reg));
+	reg[POWER] = 0x01;
+	fifo_size = 0;
+}
+
+static u8 *dmp_cell(void)
+{
+	return &dmp[(reg[BANK] << 8 | reg[OFFSET]++) % DMP_BYTES];
+}
+
+static void store(u8 at, u8 value)
+{
+	if (at == DATA) {
+		*dmp_cell() = value;
+		return;
+	}
+	if (at == POWER && (value & 0x80)) {
+		reset();
+		return;
+	}
+	if (at == USER_CTRL) {
+		if (value & 0x04)
+			fifo_size = 0;
+		value &= ~0x0d; /* reset bits clear themselves */
+	}
+	reg[at & 0x7f] = value;
+}
+
+static u8 load(u8 at)
+{
+	u8 value;
+
+	switch (at) {
+	case DATA:
+		return *dmp_cell();
+	case WHO_AM_I:
+		return who_am_i;
+	case FIFO_COUNT_H:
+		return fifo_size >> 8;
+	case FIFO_COUNT_L:
+		return fifo_size & 0xff;
+	case FIFO:
+		if (!fifo_size)
+			return 0xff;
+		value = fifo[fifo_head];
+		fifo_head = (fifo_head + 1) % FIFO_BYTES;
+		fifo_size--;
+		return value;
+	}
+	if (at >= SAMPLE && at < SAMPLE + SAMPLE_BYTES)
+		return reg[POWER] & 0x40 ? 0 : sample[at - SAMPLE];
+	return reg[at & 0x7f];
+}
+
+static void one_message(struct i2c_msg *message)
+{
+	int i = 0;
+
+	if (!(message->flags & I2C_M_RD) && message->len)
+		pointer = message->buf[i++];
+	for (; i < message->len; i++) {
+		if (message->flags & I2C_M_RD)
+			message->buf[i] = load(pointer);
+		else
+			store(pointer, message->buf[i]);
+		if (pointer != DATA && pointer != FIFO)
+			pointer++;
+	}
+}
+
+static int transfer(struct i2c_adapter *adapter, struct i2c_msg *messages, int count)
+{
+	int i, err;
+
+	mutex_lock(&bench_lock);
+	transfers++;
+	err = bench_take_fault(&fault);
+	for (i = 0; !err && i < count; i++) {
+		if (messages[i].addr != ADDRESS)
+			err = -ENXIO;
+		else
+			one_message(&messages[i]);
+	}
+	mutex_unlock(&bench_lock);
+	return err ? err : count;
+}
+
+static u32 functionality(struct i2c_adapter *adapter)
+{
+	return I2C_FUNC_I2C | I2C_FUNC_SMBUS_EMUL;
+}
+
+static const struct i2c_algorithm algorithm = { .master_xfer = transfer, .functionality = functionality };
+static struct i2c_adapter adapter = { .owner = THIS_MODULE, .name = "robot_bench I2C2", .algo = &algorithm, .nr = 2 };
+
+/* 14 bytes as the chip delivers them: accel, temperature, gyro, big-endian. */
+static ssize_t sample_write(struct file *file, const char __user *from, size_t size, loff_t *at)
+{
+	u8 bytes[SAMPLE_BYTES];
+
+	if (size != sizeof(bytes))
+		return -EINVAL;
+	if (copy_from_user(bytes, from, sizeof(bytes)))
+		return -EFAULT;
+	mutex_lock(&bench_lock);
+	memcpy(sample, bytes, sizeof(bytes));
+	mutex_unlock(&bench_lock);
+	return size;
+}
+
+static ssize_t fifo_write(struct file *file, const char __user *from, size_t size, loff_t *at)
+{
+	u8 bytes[64];
+	size_t i;
+
+	if (size > sizeof(bytes))
+		return -EINVAL;
+	if (copy_from_user(bytes, from, size))
+		return -EFAULT;
+	mutex_lock(&bench_lock);
+	for (i = 0; i < size && (reg[USER_CTRL] & 0x40); i++) {
+		fifo[(fifo_head + fifo_size) % FIFO_BYTES] = bytes[i];
+		if (fifo_size < FIFO_BYTES)
+			fifo_size++;
+		else
+			fifo_head = (fifo_head + 1) % FIFO_BYTES; /* the oldest is lost */
+	}
+	mutex_unlock(&bench_lock);
+	return size;
+}
+
+static const struct file_operations sample_fops = { .owner = THIS_MODULE, .write = sample_write };
+static const struct file_operations fifo_fops = { .owner = THIS_MODULE, .write = fifo_write };
+static struct debugfs_blob_wrapper registers = { .data = reg, .size = sizeof(reg) };
+
+int bench_imu_init(struct dentry *dir)
+{
+	reset();
+	debugfs_create_file("imu_sample", 0200, dir, NULL, &sample_fops);
+	debugfs_create_file("imu_fifo", 0200, dir, NULL, &fifo_fops);
+	debugfs_create_blob("imu_registers", 0444, dir, &registers);
+	debugfs_create_u8("imu_who_am_i", 0644, dir, &who_am_i);
+	debugfs_create_u32("imu_transfers", 0444, dir, &transfers);
+	bench_fault_files("imu", dir, &fault);
+	return i2c_add_numbered_adapter(&adapter);
+}
+
+void bench_imu_exit(void)
+{
+	i2c_del_adapter(&adapter);
+}

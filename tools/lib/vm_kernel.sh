@@ -1,0 +1,80 @@
+# Sourced after setup.sh and foreign_apt.sh: a PREEMPT_RT armhf kernel from Debian for QEMU, and the modules it lacks.
+# Everything lands in build/vm. Versions come from the archive, none is written here.
+# shellcheck shell=bash disable=SC2154
+
+vm=$root/build/vm
+kernel_tree=$vm/kernel # lib/modules/VERSION, boot/
+modules_built=$vm/modules
+
+# download_only ARCHITECTURE PACKAGE...: just these, without what they depend on, into build/vm/debs.
+download_only() {
+  local architecture=$1
+  shift
+  mkdir -p "$vm/debs"
+  foreign_apt "$architecture" bookworm --version >/dev/null # makes the private root
+  (cd "$vm/debs" && foreign_apt "$architecture" bookworm download "$@" >&2) || die "could not download: $*"
+}
+
+unpack() { # DIRECTORY DEB...
+  local target=$1 file
+  shift
+  mkdir -p "$target"
+  for file in "$@"; do dpkg-deb --fsys-tarfile "$file" | tar -x -C "$target" --no-same-owner; done
+}
+
+# prepare_kernel: sets kernel_version.
+prepare_kernel() {
+  local image stamp=$vm/kernel.stamp
+  if [ ! -f "$stamp" ]; then
+    rm -rf "$vm/debs" "$kernel_tree" "$vm/source" "$vm/headers"
+    foreign_apt armhf bookworm --version >/dev/null
+    image=$(APT_CONFIG=$root/build/apt/bookworm-armhf/apt.conf apt-cache depends linux-image-rt-armmp |
+      awk '/Depends: linux-image/ { print $2; exit }')
+    [ -n "$image" ] || die "the archive has no linux-image-rt-armmp"
+    local version=${image#linux-image-} flavour
+    flavour=${version%-rt-armmp}
+    download_only armhf "$image" "linux-headers-$version" "linux-headers-$flavour-common-rt" linux-source-6.1 \
+      busybox-static
+    download_only "$(dpkg --print-architecture)" linux-kbuild-6.1
+    unpack "$kernel_tree" "$vm/debs/${image}"_*.deb "$vm/debs"/busybox-static_*.deb
+    unpack "$vm/headers" "$vm/debs"/linux-headers-*.deb "$vm/debs"/linux-kbuild-*.deb
+    unpack "$vm/source" "$vm/debs"/linux-source-6.1_*.deb
+    tar -xJf "$vm/source/usr/src/linux-source-6.1.tar.xz" -C "$vm/source" --strip-components=1 --wildcards \
+      '*/drivers/gpio/*.[ch]' '*/kernel/irq/irq_sim.c' '*/drivers/counter/*.[ch]'
+    rm -rf "$vm/source/usr" "$vm/debs"/linux-source-*.deb
+    printf '%s\n' "$version" >"$stamp"
+  fi
+  kernel_version=$(cat "$stamp")
+}
+
+# Debian's kernel has no counter subsystem and no gpio-sim; they build as modules against its headers.
+collect_module_sources() {
+  local drivers=$vm/source/drivers
+  mkdir -p "$modules_built"
+  cp "$drivers"/counter/counter-{core,sysfs,chrdev}.c "$drivers"/counter/counter-*.h "$modules_built/"
+  cp "$drivers"/gpio/gpio-sim.c "$drivers"/gpio/gpiolib.h "$modules_built/"
+  cp "$vm/source/kernel/irq/irq_sim.c" "$modules_built/"
+  cp "$root"/tests/hardware/kernel/* "$modules_built/"
+  # What irq_sim calls is exported to built-in code only; this is its exported equivalent.
+  sed -i 's/handle_simple_irq(irq_to_desc(irqnum))/generic_handle_irq(irqnum)/' "$modules_built/irq_sim.c"
+  printf 'MODULE_LICENSE("GPL");\n' >>"$modules_built/irq_sim.c"
+  sed -i '/MODULE_DEVICE_TABLE/d' "$modules_built"/*.c # the host's modpost cannot read the target's tables
+}
+
+build_modules() {
+  local headers=$vm/headers/usr/src/linux-headers-$kernel_version stamp=$modules_built/stamp wanted
+  wanted=$(cat "$root"/tests/hardware/kernel/* "$root/tools/lib/vm_kernel.sh" | sha256sum)" $kernel_version"
+  [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ] && return 0
+  rm -rf "$modules_built"
+  collect_module_sources
+  # The headers include each other, and the kbuild tools, by absolute path.
+  find "$headers" -maxdepth 1 -name Makefile -exec sed -i "s#\([ =]\)/usr/src/#\1$vm/headers/usr/src/#g" {} +
+  say "Building kernel modules for $kernel_version"
+  make -C "$headers" M="$modules_built" ARCH=arm CROSS_COMPILE=arm-linux-gnueabihf- \
+    DEB_BUILD_ARCH="$(dpkg --print-architecture)" DEB_HOST_ARCH=armhf DEB_HOST_GNU_TYPE=arm-linux-gnueabihf \
+    -j "$jobs" modules >"$vm/modules.log" 2>&1 || {
+    tail -30 "$vm/modules.log" >&2
+    die "the kernel modules did not build; log: $vm/modules.log"
+  }
+  printf '%s\n' "$wanted" >"$stamp"
+}
