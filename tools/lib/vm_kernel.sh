@@ -78,3 +78,49 @@ build_modules() {
   }
   printf '%s\n' "$wanted" >"$stamp"
 }
+
+# make_initramfs: busybox, the modules in loading order, tests/hardware/init.
+make_initramfs() {
+  local stage=$vm/initramfs.d modules=$kernel_tree/lib/modules/$kernel_version file
+  rm -rf "$stage"
+  mkdir -p "$stage"/{bin,dev,mnt,modules,proc,sys,tmp}
+  cp "$kernel_tree/bin/busybox" "$stage/bin/"
+  for file in sh mount mkdir insmod sed sleep sync cat; do ln -s busybox "$stage/bin/$file"; done
+  cp "$root/tests/hardware/init" "$stage/init"
+  chmod +x "$stage/init"
+  ln -s /mnt/build/sysroot/usr/lib "$stage/lib" # programs of the preset bbb find their loader and libraries
+  [ -e "$modules/modules.dep" ] || depmod -b "$kernel_tree" "$kernel_version"
+  {
+    for file in virtio_pci 9p 9pnet_virtio configfs i2c-dev industrialio vcan can-raw; do
+      modprobe -d "$kernel_tree" -S "$kernel_version" --show-depends "$file"
+    done
+    printf 'insmod %s\n' "$modules_built"/{irq_sim,gpio-sim,counter,robot_bench}.ko
+  } | awk '$1 == "insmod" && !seen[$2]++ { print $2 }' | while read -r file; do
+    cp "$file" "$stage/modules/"
+    printf '/modules/%s\n' "${file##*/}" >>"$stage/modules/order"
+  done
+  (cd "$stage" && find . | cpio -o -H newc --quiet | gzip -1) >"$vm/initramfs.gz"
+}
+
+# run_machine SECONDS SCRIPT: boots, runs the script of the project in it; the console on stdout.
+run_machine() {
+  timeout "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none \
+    -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/initramfs.gz" \
+    -append "console=ttyAMA0 quiet panic=-1 run=/mnt/$2" \
+    -virtfs "local,path=$root,mount_tag=project,security_model=none,readonly=on,multidevs=remap" </dev/null
+}
+
+# tally_console FILE: prints what failed and "N passed, N failed"; a suite that does not finish is a failure.
+tally_console() {
+  local passed failed
+  tr -d '\r' <"$1" | grep -E '^VM: |^\[  FAILED  \]|Failure$|Kernel panic|Oops|BUG:' >&2 || true
+  read -r passed failed < <(tr -d '\r' <"$1" | awk '
+    /^VM: running/ { begun++ }
+    /^\[==========\] .* ran\./ { ended++ }
+    /^\[  PASSED  \] [0-9]+ test/ { passed += $4 }
+    /^ *[0-9]+ FAILED TEST/ { failed += $1 }
+    /Kernel panic|Oops|BUG:|^VM: could not|^VM: no / { failed++ }
+    END { if (begun == 0 || ended < begun) failed++; print passed + 0, failed + 0 }')
+  printf '%s passed, %s failed\n' "$passed" "$failed"
+  [ "$failed" -eq 0 ]
+}
