@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <sysfs.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -43,9 +44,18 @@ bbb_pin_t pinOf(const char* chip, uint32_t line, bool active_low = false) {
   out.active_low = active_low;
   return out;
 }
+// Channels that a killed process of an earlier test left exported.
+void unexportAll() {
+  for (const char* device : {"48302200", "48304200"}) {
+    char chip[SYSFS_PATH_MAX];
+    if (sysfs_find("/sys/class/pwm", "pwmchip", device, chip) != 0) continue;
+    for (const uint64_t channel : {0, 1}) (void)sysfs_write_number(chip, "unexport", channel);
+  }
+}
 }  // namespace
 
 Bench::Bench() {
+  unexportAll();
   for (const char* device : {"imu", "pwm", "counter", "adc"}) fault(device, 0, 0);
   setImu({0, 0, 4096}, {0, 0, 0});
   setCounts({0, 0, 0});
