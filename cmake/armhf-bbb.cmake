@@ -16,6 +16,10 @@ set(bbb_cpu "-mcpu=cortex-a8 -mfpu=neon -mfloat-abi=hard -mthumb")
 set(CMAKE_C_FLAGS_INIT "${bbb_cpu}")
 set(CMAKE_CXX_FLAGS_INIT "${bbb_cpu} -Wno-psabi")  # a note about GCC 7's ABI, of no concern here
 
+# The target's own C and C++ libraries, not the cross compiler's: they may be of a later Debian.
+file(GLOB bbb_gcc_libraries ${BBB_SYSROOT}/usr/lib/gcc/${bbb_triple}/*)
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-L${BBB_SYSROOT}/usr/lib/${bbb_triple} -L${bbb_gcc_libraries}")
+
 set(CMAKE_FIND_ROOT_PATH ${CMAKE_SYSROOT})
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)

@@ -85,10 +85,9 @@ make_initramfs() {
   rm -rf "$stage"
   mkdir -p "$stage"/{bin,dev,mnt,modules,proc,sys,tmp}
   cp "$kernel_tree/bin/busybox" "$stage/bin/"
-  for file in sh mount mkdir insmod sed sleep sync cat; do ln -s busybox "$stage/bin/$file"; done
+  for file in sh mount mkdir insmod ln sleep sync cat; do ln -s busybox "$stage/bin/$file"; done
   cp "$root/tests/hardware/init" "$stage/init"
   chmod +x "$stage/init"
-  ln -s /mnt/build/sysroot/usr/lib "$stage/lib" # programs of the preset bbb find their loader and libraries
   [ -e "$modules/modules.dep" ] || depmod -b "$kernel_tree" "$kernel_version"
   {
     for file in virtio_pci 9p 9pnet_virtio configfs i2c-dev industrialio vcan can-raw; do
@@ -102,11 +101,11 @@ make_initramfs() {
   (cd "$stage" && find . | cpio -o -H newc --quiet | gzip -1) >"$vm/initramfs.gz"
 }
 
-# run_machine SECONDS SCRIPT: boots, runs the script of the project in it; the console on stdout.
+# run_machine SECONDS ARGUMENTS: boots; the arguments go to tests/hardware/init. The console is on stdout.
 run_machine() {
   timeout "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none \
     -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/initramfs.gz" \
-    -append "console=ttyAMA0 quiet panic=-1 run=/mnt/$2" \
+    -append "console=ttyAMA0 quiet panic=-1 $2" \
     -virtfs "local,path=$root,mount_tag=project,security_model=none,readonly=on,multidevs=remap" </dev/null
 }
 
