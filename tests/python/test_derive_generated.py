@@ -30,8 +30,10 @@ def test_last_digits_of_another_solver_are_not_stale():
 
 MBBR_PROGRAM = r"""
 #include <cstdio>
+#include "generated/mbbr_gains.hpp"
 #include "generated/mbbr_model.hpp"
 using namespace equipoise::generated::mbbr;
+static_assert(kScheduled.size() == kRows && kScheduled[0].yaw_rate_rad_s == 0.0);
 template <class T> void run() {
   const Parameters p{PARAMETERS};
   const Coefficients<T> c = coefficients<T>(p);

@@ -12,11 +12,13 @@ import re
 import sys
 from pathlib import Path
 
-from . import mbbr_header
+from . import mbbr_gains, mbbr_header
 
 TARGETS = {
     "mbbr_model.hpp": mbbr_header.render,
+    "mbbr_gains.hpp": mbbr_gains.render,
 }
+REPORTS = [mbbr_gains.report]
 DEFAULT_FOLDER = Path(__file__).resolve().parents[2] / "config" / "generated"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:e[-+]?\d+)?(?!\w)")
 # Gains come out of an iterative solver; linear algebra libraries differ in the last digits.
@@ -57,4 +59,6 @@ def main(arguments=None) -> int:
     for name, render in TARGETS.items():
         (options.output / name).write_text(render(), encoding="utf-8")
         print(f"wrote {options.output / name}")
+    for report in REPORTS:
+        print("\n".join(report()))
     return 0
