@@ -193,6 +193,30 @@ TEST(CanHardware, FramesCrossAVirtualBus) {
   can_close(&b);
 }
 
+TEST(CanHardware, ErrorFramesTellTheBusState) {
+  can_port_t port;
+  can_port_t controller;  // plays it: error frames sent into a virtual bus arrive as a controller's would
+  ASSERT_EQ(can_open(&port, "can9"), 0);
+  ASSERT_EQ(can_open(&controller, "can9"), 0);
+  const auto stateAfter = [&](canid_t kind, uint8_t detail) {
+    can_frame frame{};
+    frame.can_id = CAN_ERR_FLAG | kind;
+    frame.can_dlc = CAN_ERR_DLC;
+    frame.data[1] = detail;
+    EXPECT_EQ(can_send(&controller, &frame), 0);
+    can_frame seen{};
+    EXPECT_EQ(can_receive(&port, &seen), -EAGAIN);
+    return port.state;
+  };
+  EXPECT_EQ(stateAfter(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING), CAN_BUS_WARNING);
+  EXPECT_EQ(stateAfter(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE), CAN_BUS_PASSIVE);
+  EXPECT_EQ(stateAfter(CAN_ERR_BUSOFF, 0), CAN_BUS_OFF);
+  EXPECT_EQ(port.bus_offs, 1u);
+  EXPECT_EQ(stateAfter(CAN_ERR_RESTARTED, 0), CAN_BUS_ACTIVE);
+  can_close(&port);
+  can_close(&controller);
+}
+
 // Last: the devices do not come back.
 TEST(ZUnplugHardware, KeptDescriptorsReportTheMissingDevice) {
   Bench bench;

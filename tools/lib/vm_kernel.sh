@@ -1,42 +1,22 @@
-# Sourced after setup.sh and foreign_apt.sh: a PREEMPT_RT armhf kernel from Debian for QEMU, and the modules it lacks.
+# Sourced after setup.sh, foreign_apt.sh and vm_machine.sh: a PREEMPT_RT armhf kernel from Debian for QEMU, and the modules it lacks.
 # Everything lands in build/vm. Versions come from the archive, none is written here.
 # shellcheck shell=bash disable=SC2154
 
-vm=$root/build/vm
 kernel_tree=$vm/kernel # lib/modules/VERSION, boot/
 modules_built=$vm/modules
-
-# download_only ARCHITECTURE PACKAGE...: just these, without what they depend on, into build/vm/debs.
-download_only() {
-  local architecture=$1
-  shift
-  mkdir -p "$vm/debs"
-  foreign_apt "$architecture" bookworm --version >/dev/null # makes the private root
-  (cd "$vm/debs" && foreign_apt "$architecture" bookworm download "$@" >&2) || die "could not download: $*"
-}
-
-unpack() { # DIRECTORY DEB...
-  local target=$1 file
-  shift
-  mkdir -p "$target"
-  for file in "$@"; do dpkg-deb --fsys-tarfile "$file" | tar -x -C "$target" --no-same-owner; done
-}
 
 # prepare_kernel: sets kernel_version.
 prepare_kernel() {
   local image stamp=$vm/kernel.stamp
   if [ ! -f "$stamp" ]; then
     rm -rf "$vm/debs" "$kernel_tree" "$vm/source" "$vm/headers"
-    foreign_apt armhf bookworm --version >/dev/null
-    image=$(APT_CONFIG=$root/build/apt/bookworm-armhf/apt.conf apt-cache depends linux-image-rt-armmp |
-      awk '/Depends: linux-image/ { print $2; exit }')
-    [ -n "$image" ] || die "the archive has no linux-image-rt-armmp"
+    image=$(image_of armhf linux-image-rt-armmp)
     local version=${image#linux-image-} flavour
     flavour=${version%-rt-armmp}
     download_only armhf "$image" "linux-headers-$version" "linux-headers-$flavour-common-rt" linux-source-6.1 \
       busybox-static
     download_only "$(dpkg --print-architecture)" linux-kbuild-6.1
-    unpack "$kernel_tree" "$vm/debs/${image}"_*.deb "$vm/debs"/busybox-static_*.deb
+    unpack "$kernel_tree" "$vm/debs/${image}"_*.deb "$vm/debs"/busybox-static_*_armhf.deb
     unpack "$vm/headers" "$vm/debs"/linux-headers-*.deb "$vm/debs"/linux-kbuild-*.deb
     unpack "$vm/source" "$vm/debs"/linux-source-6.1_*.deb
     tar -xJf "$vm/source/usr/src/linux-source-6.1.tar.xz" -C "$vm/source" --strip-components=1 --wildcards \
@@ -79,47 +59,10 @@ build_modules() {
   printf '%s\n' "$wanted" >"$stamp"
 }
 
-# make_initramfs: busybox, the modules in loading order, tests/hardware/init.
-make_initramfs() {
-  local stage=$vm/initramfs.d modules=$kernel_tree/lib/modules/$kernel_version file
-  rm -rf "$stage"
-  mkdir -p "$stage"/{bin,dev,mnt,modules,proc,sys,tmp}
-  cp "$kernel_tree/bin/busybox" "$stage/bin/"
-  for file in sh mount mkdir insmod ln sleep sync cat; do ln -s busybox "$stage/bin/$file"; done
-  cp "$root/tests/hardware/init" "$stage/init"
-  chmod +x "$stage/init"
-  [ -e "$modules/modules.dep" ] || depmod -b "$kernel_tree" "$kernel_version"
-  {
-    for file in virtio_pci 9p 9pnet_virtio configfs i2c-dev industrialio vcan can-raw; do
-      modprobe -d "$kernel_tree" -S "$kernel_version" --show-depends "$file"
-    done
-    printf 'insmod %s\n' "$modules_built"/{irq_sim,gpio-sim,counter,robot_bench}.ko
-  } | awk '$1 == "insmod" && !seen[$2]++ { print $2 }' | while read -r file; do
-    cp "$file" "$stage/modules/"
-    printf '/modules/%s\n' "${file##*/}" >>"$stage/modules/order"
-  done
-  (cd "$stage" && find . | cpio -o -H newc --quiet | gzip -1) >"$vm/initramfs.gz"
-}
-
 # run_machine SECONDS ARGUMENTS: boots; the arguments go to tests/hardware/init. The console is on stdout.
 run_machine() {
   timeout "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none \
     -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/initramfs.gz" \
     -append "console=ttyAMA0 quiet panic=-1 $2" \
     -virtfs "local,path=$root,mount_tag=project,security_model=none,readonly=on,multidevs=remap" </dev/null
-}
-
-# tally_console FILE: prints what failed and "N passed, N failed"; a suite that does not finish is a failure.
-tally_console() {
-  local passed failed
-  tr -d '\r' <"$1" | grep -E '^VM: |^\[  FAILED  \]|Failure$|Kernel panic|Oops|BUG:' >&2 || true
-  read -r passed failed < <(tr -d '\r' <"$1" | awk '
-    /^VM: running/ { begun++ }
-    /^\[==========\] .* ran\./ { ended++ }
-    /^\[  PASSED  \] [0-9]+ test/ { passed += $4 }
-    /^ *[0-9]+ FAILED TEST/ { failed += $1 }
-    /Kernel panic|Oops|BUG:|^VM: could not|^VM: no / { failed++ }
-    END { if (begun == 0 || ended < begun) failed++; print passed + 0, failed + 0 }')
-  printf '%s passed, %s failed\n' "$passed" "$failed"
-  [ "$failed" -eq 0 ]
 }

@@ -1,0 +1,69 @@
+# Sourced after setup.sh and foreign_apt.sh: what the emulated machines share. Everything lands in build/vm.
+# shellcheck shell=bash disable=SC2154
+
+vm=$root/build/vm
+
+# download_only ARCHITECTURE PACKAGE...: just these, without what they depend on, into build/vm/debs.
+download_only() {
+  local architecture=$1
+  shift
+  mkdir -p "$vm/debs"
+  foreign_apt "$architecture" bookworm --version >/dev/null # makes the private root
+  (cd "$vm/debs" && foreign_apt "$architecture" bookworm download "$@" >&2) || die "could not download: $*"
+}
+
+unpack() { # DIRECTORY DEB...
+  local target=$1 file
+  shift
+  mkdir -p "$target"
+  for file in "$@"; do dpkg-deb --fsys-tarfile "$file" | tar -x -C "$target" --no-same-owner; done
+}
+
+# image_of ARCHITECTURE METAPACKAGE: the kernel package it stands for today.
+image_of() {
+  local image
+  foreign_apt "$1" bookworm --version >/dev/null # makes the private root
+  image=$(APT_CONFIG=$root/build/apt/bookworm-$1/apt.conf apt-cache depends "$2" |
+    awk '/Depends: linux-image/ { print $2; exit }')
+  [ -n "$image" ] || die "the archive has no $2"
+  printf '%s\n' "$image"
+}
+
+# make_initramfs TREE VERSION INIT OUTPUT MODULE...: busybox, the modules and all they need in loading order (a name
+# of the kernel's tree or the path of a .ko), and the first process.
+make_initramfs() {
+  local tree=$1 version=$2 init=$3 output=$4 stage=$4.d module
+  shift 4
+  rm -rf "$stage"
+  mkdir -p "$stage"/{bin,dev,mnt,modules,proc,sys,tmp}
+  cp "$tree/bin/busybox" "$stage/bin/"
+  for module in sh mount mkdir insmod ln sleep sync cat chroot; do ln -s busybox "$stage/bin/$module"; done
+  cp "$init" "$stage/init"
+  chmod +x "$stage/init"
+  [ -e "$tree/lib/modules/$version/modules.dep" ] || depmod -b "$tree" "$version"
+  for module in "$@"; do
+    case $module in
+    *.ko) printf 'insmod %s\n' "$module" ;;
+    *) modprobe -d "$tree" -S "$version" --show-depends "$module" ;;
+    esac
+  done | awk '$1 == "insmod" && !seen[$2]++ { print $2 }' | while read -r module; do
+    cp "$module" "$stage/modules/"
+    printf '/modules/%s\n' "${module##*/}" >>"$stage/modules/order"
+  done
+  (cd "$stage" && find . | cpio -o -H newc --quiet | gzip -1) >"$output"
+}
+
+# tally_console FILE...: prints what failed and "N passed, N failed"; a suite that does not finish is a failure.
+tally_console() {
+  local passed failed
+  cat "$@" | tr -d '\r' | grep -E '^VM: |^\[  FAILED  \]|Failure$|Kernel panic|Oops|BUG:' >&2 || true
+  read -r passed failed < <(cat "$@" | tr -d '\r' | awk '
+    /^VM: running/ { begun++ }
+    /^\[==========\] .* ran\./ { ended++ }
+    /^\[  PASSED  \] [0-9]+ test/ { passed += $4 }
+    /^ *[0-9]+ FAILED TEST/ { failed += $1 }
+    /Kernel panic|Oops|BUG:|^VM: could not|^VM: no / { failed++ }
+    END { if (begun == 0 || ended < begun) failed++; print passed + 0, failed + 0 }')
+  printf '%s passed, %s failed\n' "$passed" "$failed"
+  [ "$failed" -eq 0 ]
+}
