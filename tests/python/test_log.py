@@ -52,6 +52,13 @@ def test_an_intact_log_is_read_whole(tmp_path):
     assert state["theta_rad"].dtype.isnative
 
 
+def test_time_starts_at_the_first_sample_not_at_the_description_of_the_run(tmp_path):
+    log = read_log(small_log(tmp_path / "a.lcm", more=[("EQUIPOISE_RUN", equipoise.run_t().encode())]))
+    assert log["EQUIPOISE_RUN"][0].utime == 0
+    assert log.seconds("EQUIPOISE_STATE")[0] == 0.0
+    assert log.duration_s == pytest.approx(19 * 0.005)
+
+
 def test_values_agree_with_the_generated_decoder(known_log):
     log = read_log(known_log)
     rows = {}

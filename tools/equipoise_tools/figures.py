@@ -165,7 +165,8 @@ class Report:
 
     def duties(self, axes: plt.Axes) -> None:
         motors = self.log[names.MOTORS]
-        count = max(1, min(int(motors["motors"].max()), motors["duty"].shape[1]))
+        moving = np.flatnonzero(np.abs(motors["duty"]).max(axis=0))
+        count = 1 + int(moving[-1]) if moving.size else 1
         for motor in range(count):
             y = motors["duty"][:, motor]
             axes.plot(

@@ -96,5 +96,6 @@ def read_log(path: str | Path) -> Log:
         log.notes.append(f"channel {channel}: {count} messages of an unknown type or version are left out")
     if not log:
         raise UserError(f"{path}: holds no message of a type this version knows ({'; '.join(log.notes)})")
-    log.start_utime = min(utime for utime, channel, _ in events if channel in log)
+    # A record array counts, a description of the run does not: on a robot the clock starts at its boot.
+    log.start_utime = min((int(r["utime"][0]) for r in log.values() if r.dtype.names), default=0)
     return log

@@ -73,6 +73,15 @@ def wrapped(angle_rad: np.ndarray) -> np.ndarray:
     return (angle_rad + np.pi) % (2 * np.pi) - np.pi
 
 
+def rolling_rates(records: np.ndarray, axes: int) -> np.ndarray:
+    """Of the ball about the inertial axes (telemetry has them in the yaw frame), or of the wheels."""
+    if axes == 1:
+        return records["phi_dot_rad_s"][:, :1]
+    cos, sin = np.cos(records["theta_rad"][:, 2]), np.sin(records["theta_rad"][:, 2])
+    x, y = records["phi_dot_rad_s"].T
+    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
+
+
 def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
 
@@ -82,7 +91,7 @@ def errors_of(log: Log, channel: str) -> Errors:
     axes = tilt_axes(log)
     t_s = (estimate["utime"] - log.start_utime) * 1e-6
     tilt = wrapped(estimate["theta_rad"][:, :axes] - truth["theta_rad"][:, :axes])
-    rolling = estimate["phi_dot_rad_s"][:, :axes] - truth["phi_dot_rad_s"][:, :axes]
+    rolling = rolling_rates(estimate, axes) - rolling_rates(truth, axes)
     counted = t_s >= SETTLE_S
     run = run_record(log)
     rolling_rmse = rms(rolling[counted])
@@ -97,14 +106,14 @@ def errors_of(log: Log, channel: str) -> Errors:
 
 
 def estimator_channels(log: Log) -> dict[str, str]:
-    """Estimator -> channel, the controlling one first."""
+    """Estimator -> channel, the controlling one first; the truth is not compared with itself."""
     found = {}
     if names.STATE in log:
         run = run_record(log)
         found[run.estimator if run is not None else "estimate"] = names.STATE
     for channel in sorted(log):
         name = names.estimator_of(channel)
-        if name is not None:
+        if name is not None and name != "truth":
             found.setdefault(name, channel)
     return found
 
@@ -146,14 +155,17 @@ def summarise(log: Log) -> Summary:
         fell_at_s=fell_at(log),
     )
     if best in log:
-        settled = log.seconds(best) >= SETTLE_S
-        rate = log[best]["omega_B_rad_s"][settled, 2]
-        summary.yaw_rate_mean_hz = float(rate.mean() / (2 * np.pi)) if rate.size else None
+        t_s = log.seconds(best)
+        settled = t_s >= SETTLE_S
+        if np.count_nonzero(settled) > 1:
+            heading, t_s = np.unwrap(log[best]["theta_rad"][:, 2])[settled], t_s[settled]
+            summary.yaw_rate_mean_hz = float((heading[-1] - heading[0]) / (t_s[-1] - t_s[0]) / (2 * np.pi))
     if names.MOTORS in log:
         motors = log[names.MOTORS]
-        duty = np.abs(motors["duty"])
-        summary.duty_max = float(duty.max())
-        summary.saturated_fraction = float(motors["saturated"].mean())
+        running = motors["enable"]
+        if running.any():
+            summary.duty_max = float(np.abs(motors["duty"][running]).max())
+            summary.saturated_fraction = float(motors["saturated"][running].mean())
     if names.HEALTH in log:
         health = log[names.HEALTH]
         ticks_armed = np.count_nonzero(health["arm_state"] == names.ARM_STATES.index("armed"))

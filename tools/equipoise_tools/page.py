@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from html import escape
 
 from .log import Log
@@ -64,7 +65,10 @@ def estimator_rows(summary: Summary) -> tuple[tuple[str, ...], list[tuple[str, .
     rows = []
     for name, errors in summary.estimators.items():
         speed = 100 * errors.speed_rmse_m_s if in_metres else errors.rolling_rmse_rad_s
-        rows.append((name, f"{errors.attitude_rmse_rad:.5f}", f"{speed:.3f}"))
+        counted = math.isfinite(errors.attitude_rmse_rad)  # else the run ended before errors count
+        rows.append(
+            (name, f"{errors.attitude_rmse_rad:.5f}", f"{speed:.3f}") if counted else (name, "-", "-")
+        )
     return head, rows
 
 
