@@ -63,7 +63,8 @@ install_packages() {
     die "packages are missing and there is no sudo; as root: apt-get install ${missing[*]}"
   say "Installing ${#missing[@]} Debian packages: ${missing[*]}"
   [ -z "$(dpkg --audit)" ] || as_root dpkg --configure -a >&2 # an earlier installation was interrupted
-  if ! { compgen -G '/var/lib/apt/lists/*Packages*' >/dev/null &&
+  # The lists at hand may be absent (a dry run tells) or too old for what the mirror still has (only installing tells).
+  if ! { apt_get install --simulate --no-install-recommends "${missing[@]}" >/dev/null 2>&1 &&
     apt_get install -y --no-install-recommends "${missing[@]}"; }; then
     say "Refreshing the package lists"
     apt_get update || die "apt-get update failed; check the network and /etc/apt/sources.list"

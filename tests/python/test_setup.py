@@ -1,0 +1,124 @@
+"""tools/run and tools/test install only what is missing, and say clearly when they cannot."""
+
+import os
+import subprocess
+
+import pytest
+
+FAKES = {
+    # Everything is installed but what MISSING lists.
+    "dpkg-query": 'case " $MISSING " in *" $3 "*) exit 1 ;; esac; echo installed',
+    "dpkg": '[ "$1" = --print-architecture ] && echo amd64; exit 0',
+    # Writes real calls down. NO_LISTS: knows no package until updated; OLD_LISTS: cannot fetch any.
+    "apt-get": """
+words=
+for word; do case $word in -* | *::*) ;; *) words="$words $word" ;; esac; done
+case " $* " in *" --simulate "*) [ -z "$NO_LISTS" ] || [ -e "$CALLS.updated" ]; exit ;; esac
+echo "$words" >>"$CALLS"
+case $words in
+" update") touch "$CALLS.updated" ;;
+*) [ -z "$OLD_LISTS" ] || [ -e "$CALLS.updated" ] ;;
+esac""",
+    "id": 'echo "${FAKE_UID:-0}"',
+    "sudo": 'echo " sudo" >>"$CALLS"; exec "$@"',
+}
+
+
+@pytest.fixture
+def machine(tmp_path, root):
+    """A copy of the set-up in a tree of its own, on a machine made of fakes."""
+    lib = tmp_path / "tree" / "tools" / "lib"
+    lib.mkdir(parents=True)
+    (tmp_path / "tree" / "build").mkdir()
+    (lib / "setup.sh").write_text((root / "tools/lib/setup.sh").read_text())
+    (lib.parent / "packages.txt").write_text(
+        "# note\n[host]  # why\ncmake\nninja-build  # fast\n\n[test]\nshellcheck\n"
+    )
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    calls = tmp_path / "calls"
+
+    def run(groups="host test", without=(), **environment):
+        for name, body in FAKES.items():
+            if name not in without:
+                (programs / name).write_text(f"#!/bin/sh\n{body}\n")
+                (programs / name).chmod(0o755)
+        for name in ("bash", "awk", "cat", "dirname", "env", "nproc", "sh", "touch"):
+            (programs / name).unlink(missing_ok=True)
+            (programs / name).symlink_to(
+                next(p for p in (f"/usr/bin/{name}", f"/bin/{name}") if os.path.exists(p))
+            )
+        calls.write_text("")
+        defaults = {"MISSING": "", "NO_LISTS": "", "OLD_LISTS": "", "FAKE_UID": "0"}
+        result = subprocess.run(
+            [programs / "bash", "-c", f"source {lib}/setup.sh; install_packages {groups}"],
+            env={"PATH": str(programs), "CALLS": str(calls), **defaults, **environment},
+            capture_output=True,
+            text=True,
+        )
+        return result, calls.read_text().splitlines()
+
+    return run
+
+
+def test_nothing_missing_means_apt_is_not_called(machine):
+    result, calls = machine()
+    assert (result.returncode, calls, result.stderr) == (0, [], "")
+
+
+def test_only_what_is_missing_is_installed_without_new_lists(machine):
+    result, calls = machine(MISSING="ninja-build shellcheck")
+    assert result.returncode == 0, result.stderr
+    assert calls == [" install ninja-build shellcheck"]
+
+
+def test_only_the_asked_groups_are_looked_at(machine):
+    _, calls = machine(groups="host", MISSING="ninja-build shellcheck")
+    assert calls == [" install ninja-build"]
+
+
+@pytest.mark.parametrize("lists", ["NO_LISTS", "OLD_LISTS"])
+def test_package_lists_are_refreshed_when_they_do_not_serve(machine, lists):
+    result, calls = machine(MISSING="cmake", **{lists: "yes"})
+    assert result.returncode == 0, result.stderr
+    assert calls[-2:] == [" update", " install cmake"]
+
+
+def test_an_ordinary_user_installs_through_sudo(machine):
+    _, calls = machine(MISSING="cmake", FAKE_UID="1000")
+    assert calls[-1] == " install cmake"
+    assert " sudo" in calls
+
+
+def test_an_ordinary_user_without_sudo_is_told_what_to_run(machine):
+    result, calls = machine(MISSING="cmake", FAKE_UID="1000", without=["sudo"])
+    assert result.returncode == 1
+    assert calls == []
+    assert "as root: apt-get install cmake" in result.stderr
+
+
+def test_another_system_is_told_what_to_install(machine):
+    result, _ = machine(without=["apt-get"])
+    assert result.returncode == 1
+    assert result.stderr == (
+        "error: this is not a Debian system; install by hand what tools/packages.txt lists\n"
+    )
+
+
+@pytest.mark.parametrize("command", ["run", "test", "lint", "lib/multicast"])
+def test_every_command_has_help(root, command):
+    result = subprocess.run([root / "tools" / command, "--help"], capture_output=True, text=True)
+    assert result.returncode == 0
+    assert "usage:" in result.stdout
+    assert result.stderr == ""
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--no-such"], ["--jobs"], ["--jobs", "0"], ["--jobs", "many"], ["--preset", "other"]]
+)
+def test_wrong_usage_of_the_test_command_is_one_line_and_status_2(root, arguments):
+    result = subprocess.run([root / "tools/test", *arguments], capture_output=True, text=True)
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stderr.startswith("error: ")
