@@ -1,7 +1,7 @@
 """Tilt and translation of the MBBR at a constant yaw rate, as one complex system of four states.
 
 z = theta_x + i theta_y, e = phi* error, w = body rate, v = phi*' error. With theta_z' = Omega and the u_z
-that holds it, x' = A x + b u, u = u_x + i u_y. Angles measured in the yaw frame turn with it: e' = v - i Omega e.
+that holds it, x' = A x + b u, u = u_x + i u_y. Angles seen in the yaw frame turn with it: e' = v - i Omega e.
 """
 
 from __future__ import annotations

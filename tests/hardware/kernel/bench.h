@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0 */
-/* robot_bench: a robot's peripherals behind the real kernel subsystems: MPU-9250 on /dev/i2c-2, two EHRPWM modules,
- * three eQEP decoders, the ADC. In: debugfs /sys/kernel/debug/robot_bench (what the sensors measure, faults).
- * Out: what the drivers wrote. GPIO lines are gpio-sim's. Linux 6.1. */
+/* robot_bench: a robot's peripherals behind the real kernel subsystems: MPU-9250 on /dev/i2c-2, two EHRPWM
+ * modules, three eQEP decoders, the ADC. In: debugfs /sys/kernel/debug/robot_bench (what the sensors measure,
+ * faults). Out: what the drivers wrote. GPIO lines are gpio-sim's. Linux 6.1. */
 #ifndef ROBOT_BENCH_H
 #define ROBOT_BENCH_H
 

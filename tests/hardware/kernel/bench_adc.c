@@ -13,7 +13,8 @@ static struct iio_dev *iio;
 static u32 counts[INPUTS];
 static struct bench_fault fault;
 
-static int read_raw(struct iio_dev *dev, struct iio_chan_spec const *channel, int *value, int *value2, long mask)
+static int read_raw(struct iio_dev *dev, struct iio_chan_spec const *channel, int *value, int *value2,
+		    long mask)
 {
 	int err;
 
@@ -26,10 +27,14 @@ static int read_raw(struct iio_dev *dev, struct iio_chan_spec const *channel, in
 	return err ? err : IIO_VAL_INT;
 }
 
-#define INPUT(n) { .type = IIO_VOLTAGE, .indexed = 1, .channel = (n), .info_mask_separate = BIT(IIO_CHAN_INFO_RAW) }
-static const struct iio_info info = { .read_raw = read_raw };
-static const struct iio_chan_spec inputs[INPUTS] = { INPUT(0), INPUT(1), INPUT(2), INPUT(3),
-						     INPUT(4), INPUT(5), INPUT(6), INPUT(7) };
+#define INPUT(n)                                                                                             \
+	{                                                                                                    \
+		.type = IIO_VOLTAGE, .indexed = 1, .channel = (n),                                           \
+		.info_mask_separate = BIT(IIO_CHAN_INFO_RAW)                                                 \
+	}
+static const struct iio_info info = {.read_raw = read_raw};
+static const struct iio_chan_spec inputs[INPUTS] = {INPUT(0), INPUT(1), INPUT(2), INPUT(3),
+						    INPUT(4), INPUT(5), INPUT(6), INPUT(7)};
 
 int bench_adc_init(struct dentry *dir)
 {

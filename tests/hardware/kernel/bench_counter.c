@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0
-/* Three eQEP decoders with the interface of ti-eqep: the ceiling resets to 0, the count wraps at ceiling + 1. */
+/* Three eQEP decoders with the interface of ti-eqep: the ceiling resets to 0, the count wraps at ceiling + 1.
+ */
 #include <linux/counter.h>
 #include <linux/fs.h>
 #include <linux/module.h>
@@ -20,8 +21,8 @@ struct bench_decoder {
 	enum counter_function function;
 };
 
-static struct bench_decoder decoders[DECODERS] = { { .name = "48300180" }, { .name = "48302180" },
-						   { .name = "48304180" } };
+static struct bench_decoder decoders[DECODERS] = {
+    {.name = "48300180"}, {.name = "48302180"}, {.name = "48304180"}};
 static s64 positions[DECODERS]; /* where the wheels are, in counts */
 static struct bench_fault fault;
 
@@ -43,20 +44,22 @@ static int count_read(struct counter_device *counter, struct counter_count *coun
 	return err;
 }
 
-static int function_read(struct counter_device *counter, struct counter_count *count, enum counter_function *function)
+static int function_read(struct counter_device *counter, struct counter_count *count,
+			 enum counter_function *function)
 {
 	*function = decoder_of(counter)->function;
 	return 0;
 }
 
-static int function_write(struct counter_device *counter, struct counter_count *count, enum counter_function function)
+static int function_write(struct counter_device *counter, struct counter_count *count,
+			  enum counter_function function)
 {
 	decoder_of(counter)->function = function;
 	return 0;
 }
 
-static int action_read(struct counter_device *counter, struct counter_count *count, struct counter_synapse *synapse,
-		       enum counter_synapse_action *action)
+static int action_read(struct counter_device *counter, struct counter_count *count,
+		       struct counter_synapse *synapse, enum counter_synapse_action *action)
 {
 	*action = COUNTER_SYNAPSE_ACTION_BOTH_EDGES;
 	return 0;
@@ -88,19 +91,26 @@ static int enable_write(struct counter_device *counter, struct counter_count *co
 	return 0;
 }
 
-static const struct counter_ops ops = { .count_read = count_read, .function_read = function_read,
-					.function_write = function_write, .action_read = action_read };
-static struct counter_comp extensions[] = { COUNTER_COMP_CEILING(ceiling_read, ceiling_write),
-					    COUNTER_COMP_ENABLE(enable_read, enable_write) };
-static const enum counter_function functions[] = { COUNTER_FUNCTION_PULSE_DIRECTION, COUNTER_FUNCTION_QUADRATURE_X4,
-						   COUNTER_FUNCTION_INCREASE, COUNTER_FUNCTION_DECREASE };
-static const enum counter_synapse_action actions[] = { COUNTER_SYNAPSE_ACTION_BOTH_EDGES };
-static struct counter_signal signals[] = { { .id = 0, .name = "QEPA" }, { .id = 1, .name = "QEPB" } };
-static struct counter_synapse synapses[] = { { actions, 1, &signals[0] }, { actions, 1, &signals[1] } };
-static struct counter_count counts[] = { { .id = 0, .name = "QPOSCNT", .functions_list = functions,
-					   .num_functions = ARRAY_SIZE(functions), .synapses = synapses,
-					   .num_synapses = ARRAY_SIZE(synapses), .ext = extensions,
-					   .num_ext = ARRAY_SIZE(extensions) } };
+static const struct counter_ops ops = {.count_read = count_read,
+				       .function_read = function_read,
+				       .function_write = function_write,
+				       .action_read = action_read};
+static struct counter_comp extensions[] = {COUNTER_COMP_CEILING(ceiling_read, ceiling_write),
+					   COUNTER_COMP_ENABLE(enable_read, enable_write)};
+static const enum counter_function functions[] = {COUNTER_FUNCTION_PULSE_DIRECTION,
+						  COUNTER_FUNCTION_QUADRATURE_X4, COUNTER_FUNCTION_INCREASE,
+						  COUNTER_FUNCTION_DECREASE};
+static const enum counter_synapse_action actions[] = {COUNTER_SYNAPSE_ACTION_BOTH_EDGES};
+static struct counter_signal signals[] = {{.id = 0, .name = "QEPA"}, {.id = 1, .name = "QEPB"}};
+static struct counter_synapse synapses[] = {{actions, 1, &signals[0]}, {actions, 1, &signals[1]}};
+static struct counter_count counts[] = {{.id = 0,
+					 .name = "QPOSCNT",
+					 .functions_list = functions,
+					 .num_functions = ARRAY_SIZE(functions),
+					 .synapses = synapses,
+					 .num_synapses = ARRAY_SIZE(synapses),
+					 .ext = extensions,
+					 .num_ext = ARRAY_SIZE(extensions)}};
 
 static int plug(struct bench_decoder *decoder)
 {
@@ -178,7 +188,7 @@ static ssize_t positions_write(struct file *file, const char __user *from, size_
 	return size;
 }
 
-static const struct file_operations positions_fops = { .owner = THIS_MODULE, .write = positions_write };
+static const struct file_operations positions_fops = {.owner = THIS_MODULE, .write = positions_write};
 
 int bench_counter_init(struct dentry *dir)
 {

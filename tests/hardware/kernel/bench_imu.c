@@ -9,8 +9,17 @@
 
 enum { ADDRESS = 0x68, FIFO_BYTES = 1024, DMP_BYTES = 4096 };
 enum {
-	SAMPLE = 0x3b, SAMPLE_BYTES = 14, USER_CTRL = 0x6a, POWER = 0x6b, BANK = 0x6d, OFFSET = 0x6e, DATA = 0x6f,
-	FIFO_COUNT_H = 0x72, FIFO_COUNT_L = 0x73, FIFO = 0x74, WHO_AM_I = 0x75
+	SAMPLE = 0x3b,
+	SAMPLE_BYTES = 14,
+	USER_CTRL = 0x6a,
+	POWER = 0x6b,
+	BANK = 0x6d,
+	OFFSET = 0x6e,
+	DATA = 0x6f,
+	FIFO_COUNT_H = 0x72,
+	FIFO_COUNT_L = 0x73,
+	FIFO = 0x74,
+	WHO_AM_I = 0x75
 };
 
 static u8 reg[128], pointer, who_am_i = 0x71;
@@ -115,8 +124,9 @@ static u32 functionality(struct i2c_adapter *adapter)
 	return I2C_FUNC_I2C | I2C_FUNC_SMBUS_EMUL;
 }
 
-static const struct i2c_algorithm algorithm = { .master_xfer = transfer, .functionality = functionality };
-static struct i2c_adapter adapter = { .owner = THIS_MODULE, .name = "robot_bench I2C2", .algo = &algorithm, .nr = 2 };
+static const struct i2c_algorithm algorithm = {.master_xfer = transfer, .functionality = functionality};
+static struct i2c_adapter adapter = {
+    .owner = THIS_MODULE, .name = "robot_bench I2C2", .algo = &algorithm, .nr = 2};
 
 /* 14 bytes as the chip delivers them: accel, temperature, gyro, big-endian. */
 static ssize_t sample_write(struct file *file, const char __user *from, size_t size, loff_t *at)
@@ -154,9 +164,9 @@ static ssize_t fifo_write(struct file *file, const char __user *from, size_t siz
 	return size;
 }
 
-static const struct file_operations sample_fops = { .owner = THIS_MODULE, .write = sample_write };
-static const struct file_operations fifo_fops = { .owner = THIS_MODULE, .write = fifo_write };
-static struct debugfs_blob_wrapper registers = { .data = reg, .size = sizeof(reg) };
+static const struct file_operations sample_fops = {.owner = THIS_MODULE, .write = sample_write};
+static const struct file_operations fifo_fops = {.owner = THIS_MODULE, .write = fifo_write};
+static struct debugfs_blob_wrapper registers = {.data = reg, .size = sizeof(reg)};
 
 int bench_imu_init(struct dentry *dir)
 {

@@ -45,8 +45,8 @@ static ssize_t unplug_write(struct file *file, const char __user *from, size_t s
 }
 
 static const struct file_operations unplug_fops = {
-	.owner = THIS_MODULE,
-	.write = unplug_write,
+    .owner = THIS_MODULE,
+    .write = unplug_write,
 };
 
 static int __init bench_init(void)

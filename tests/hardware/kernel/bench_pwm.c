@@ -22,7 +22,7 @@ struct bench_module {
 };
 
 static struct bench_channel channels[MODULES * CHANNELS]; /* what reaches the pins */
-static struct bench_module modules[MODULES] = { { .name = "48302200" }, { .name = "48304200" } };
+static struct bench_module modules[MODULES] = {{.name = "48302200"}, {.name = "48304200"}};
 static struct bench_fault fault;
 
 static int apply(struct pwm_chip *chip, struct pwm_device *pwm, const struct pwm_state *state)
@@ -45,8 +45,8 @@ static int apply(struct pwm_chip *chip, struct pwm_device *pwm, const struct pwm
 	return err;
 }
 
-static const struct pwm_ops ops = { .owner = THIS_MODULE, .apply = apply };
-static struct debugfs_blob_wrapper state = { .data = channels, .size = sizeof(channels) };
+static const struct pwm_ops ops = {.owner = THIS_MODULE, .apply = apply};
+static struct debugfs_blob_wrapper state = {.data = channels, .size = sizeof(channels)};
 
 static int plug(struct bench_module *module, int index)
 {
