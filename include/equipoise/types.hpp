@@ -1,0 +1,31 @@
+// Scalar, vector and matrix names used everywhere, and the constants of the tick.
+// Conventions (docs/symbols.md): W world, z up; B body; R_WB = Rz(theta_z) Ry(theta_y) Rx(theta_x);
+// v_W = R_WB * v_B. Starred quantities are resolved in the yaw frame: v_star = Rz(-theta_z) v_W.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+namespace equipoise {
+
+template <int N>
+using Vec = Eigen::Matrix<double, N, 1>;
+template <int Rows, int Cols>
+using Mat = Eigen::Matrix<double, Rows, Cols>;
+using Vec2 = Vec<2>;
+using Vec3 = Vec<3>;
+using Mat3 = Mat<3, 3>;
+
+inline constexpr double kTickHz = 200.0;         // [T] Table 5.2
+inline constexpr double kTickS = 1.0 / kTickHz;  // dt
+inline constexpr double kGravity_m_s2 = 9.8;     // [T] Tables 3.2, 5.2
+inline constexpr double kPi = 3.14159265358979323846;
+
+/// Rz(angle) applied to a horizontal vector.
+inline Vec2 rotate(double angle_rad, const Vec2& v) noexcept {
+  const double c = std::cos(angle_rad);
+  const double s = std::sin(angle_rad);
+  return {c * v.x() - s * v.y(), s * v.x() + c * v.y()};
+}
+
+}  // namespace equipoise
