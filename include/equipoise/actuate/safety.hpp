@@ -1,0 +1,71 @@
+// The only place that decides whether motors may run. In: wanted duties, robot-neutral state, sensor flags, command
+// -> out: what the bridges get, and why not. Motors start disarmed; they arm on request while everything is well, and
+// any fault disarms them in the same tick. After a fault the request has to be withdrawn and made again.
+// RT-safe.
+#pragma once
+
+#include <cstdint>
+
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+enum class ArmState : std::int32_t { kDisarmed = 0, kArmed = 1, kFault = 2 };
+
+/// Why the motors are off, as bits; names are stable (telemetry, CLI, CAN). docs/safety.md
+enum SafetyReason : std::uint32_t {
+  kNotRequested = 1u << 0,
+  kTilt = 1u << 1,
+  kImuStale = 1u << 2,
+  kEncoderStale = 1u << 3,
+  kNotFinite = 1u << 4,
+  kBatteryLow = 1u << 5,
+  kAttitudeStale = 1u << 6,
+  kGyroMoving = 1u << 7,
+};
+
+struct SafetyParams {
+  double max_tilt_rad = 0.60;          // beyond it the wheels cannot catch the body
+  double max_arm_tilt_rad = 0.20;      // and to start
+  double max_arm_rate_rad_s = 2.0;     // body rate at which arming is refused
+  int max_missed_samples = 2;          // consecutive ticks without a valid IMU or encoder sample
+  int max_attitude_age_ticks = 10;     // where the controller needs the attitude source
+  bool needs_attitude = false;
+  double min_battery_V = 6.0;          // two LiPo cells; sampled over kBatteryTicks
+};
+
+struct SafetyInputs {
+  StateView state;
+  bool imu_ok = false;
+  bool encoders_ok = false;
+  bool battery_ok = false;
+  bool attitude_ok = false;
+  double battery_V = 0.0;
+  bool all_finite = false;  // of everything the tick computed
+  bool arm_requested = false;
+};
+
+class Safety {
+ public:
+  explicit Safety(const SafetyParams& params) : p_(params) {}
+
+  MotorCommand gate(const MotorCommand& wanted, const SafetyInputs& in) noexcept;
+
+  ArmState state() const noexcept { return state_; }
+  std::uint32_t reasons() const noexcept { return reasons_; }
+  bool armed() const noexcept { return state_ == ArmState::kArmed; }
+
+ private:
+  std::uint32_t faults(const SafetyInputs& in) noexcept;
+
+  static constexpr int kBatteryTicks = 100;  // 0.5 s below the limit
+  SafetyParams p_;
+  ArmState state_ = ArmState::kDisarmed;
+  std::uint32_t reasons_ = kNotRequested;
+  int imu_missed_ = 0;
+  int encoders_missed_ = 0;
+  int attitude_age_ = 0;
+  int battery_low_ = 0;
+};
+
+}  // namespace equipoise

@@ -1,0 +1,49 @@
+// Exact rolling dynamics of the MBBR (Kane's form): body, ball without spin, wheels through phi_B'.
+// In: attitude, body rates, ball rates (yaw frame), total torque on the ball (body axes) -> accelerations.
+// Source: derived from first principles; [T] A.2 applies Lagrange to quasi-coordinates and is not used
+// (docs/derivation.md). Deterministic, no allocation.
+#pragma once
+
+#include "equipoise/robots/mbbr.hpp"
+
+namespace equipoise {
+
+struct MbbrMotion {
+  Vec2 theta_xy = Vec2::Zero();
+  Vec3 omega_B = Vec3::Zero();
+  Vec2 phi_dot_star = Vec2::Zero();
+};
+
+struct MbbrAccelerations {
+  Vec3 omega_dot_B;
+  Vec2 phi_ddot_inertial;  // inertial acceleration of the ball angles, resolved in the yaw frame
+};
+
+class MbbrDynamics {
+ public:
+  explicit MbbrDynamics(const MbbrParameters& p) noexcept;
+
+  MbbrAccelerations accelerations(const MbbrMotion& m, const Vec3& tau_B) const noexcept;
+
+  /// Ball rate relative to the body, body axes: what the encoders see. [T] (5.10)
+  static Vec3 encoder_rate_B(const MbbrMotion& m) noexcept;
+
+  /// Gravity minus acceleration at the IMU, body axes: the negative of an accelerometer's reading. [T] (5.26)
+  Vec3 accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
+
+  /// d(phi*')/dt: the inertial acceleration plus the transport term of the turning frame.
+  static Vec2 phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept;
+
+  /// Second derivatives of the Euler angles.
+  static Vec3 theta_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept;
+
+  /// Encoder-rate response to a torque about each body axis, upright: 1/effective inertia.
+  Vec3 relative_mobility() const noexcept;
+
+ private:
+  MbbrParameters p_;
+  Vec3 body_inertia_;  // about the ball's centre, with the wheels
+  double ball_inertia_;
+};
+
+}  // namespace equipoise
