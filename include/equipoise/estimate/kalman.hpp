@@ -1,0 +1,89 @@
+// Extended Kalman filter on a model with a diagonal measurement covariance.
+// In: input, measurements with a mask of those to use -> state, covariance, normalised innovation.
+// Measurements are applied one scalar at a time in Joseph form, which equals the batch update for diagonal R and
+// keeps P symmetric to the bit without a matrix inverse. RT-safe: fixed size, bounded.
+//
+// A Model supplies kStates, kInputs, kOutputs and
+//   void predict(const Vec<n>& x, const Vec<p>& u, Vec<n>& x_next, Mat<n, n>& F) const noexcept;
+//   void measure(const Vec<n>& x, const Vec<p>& u, Vec<m>& y, Mat<m, n>& H) const noexcept;
+#pragma once
+
+#include <array>
+
+#include "equipoise/types.hpp"
+
+namespace equipoise {
+
+template <class Model>
+class KalmanFilter {
+ public:
+  static constexpr int n = Model::kStates;
+  static constexpr int m = Model::kOutputs;
+  static constexpr int p = Model::kInputs;
+
+  struct Params {
+    Vec<n> Q = Vec<n>::Constant(1e-4);  // diagonal, per tick
+    Vec<m> R = Vec<m>::Ones();          // diagonal
+    double initial_variance = 1e-4;
+  };
+
+  KalmanFilter(const Model& model, const Params& params) : model_(model), params_(params) { reset(Vec<n>::Zero()); }
+
+  void reset(const Vec<n>& x) noexcept {
+    x_ = x;
+    P_ = Mat<n, n>::Identity() * params_.initial_variance;
+    normalized_innovation_ = 0.0;
+  }
+
+  void predict(const Vec<p>& u) noexcept {
+    Vec<n> x_next;
+    model_.predict(x_, u, x_next, F_);
+    x_ = x_next;
+    FP_.noalias() = F_ * P_;
+    P_.noalias() = FP_ * F_.transpose();
+    P_.template triangularView<Eigen::StrictlyUpper>() = P_.transpose();
+    P_.diagonal() += params_.Q;
+  }
+
+  void update(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
+    Vec<m> y_hat;
+    model_.measure(x_, u, y_hat, H_);
+    const Vec<n> x_prior = x_;
+    double nis = 0.0;
+    int used = 0;
+    for (int i = 0; i < m; ++i) {
+      if (!use[static_cast<std::size_t>(i)]) continue;
+      const Vec<n> h = H_.row(i).transpose();
+      const Vec<n> Ph = P_ * h;
+      const double s = h.dot(Ph) + params_.R(i);
+      const double innovation = y(i) - y_hat(i) - h.dot(x_ - x_prior);
+      const Vec<n> k = Ph / s;
+      x_ += k * innovation;
+      // (I - k h') P (I - k h')' + k r k', expanded so that every pair (i, j), (j, i) rounds alike: an asymmetry of
+      // one ulp grows by nine decades in 250 ticks at 1 Hz of yaw.
+      for (int j = 0; j < n; ++j) {
+        P_.col(j) += (k * k(j)) * s - (k * Ph(j) + Ph * k(j));
+      }
+      nis += innovation * innovation / s;
+      ++used;
+    }
+    normalized_innovation_ = used > 0 ? nis / used : 0.0;
+  }
+
+  const Vec<n>& x() const noexcept { return x_; }
+  Vec<n>& x() noexcept { return x_; }
+  const Mat<n, n>& P() const noexcept { return P_; }
+  double normalized_innovation() const noexcept { return normalized_innovation_; }
+
+ private:
+  Model model_;
+  Params params_;
+  Vec<n> x_;
+  Mat<n, n> P_;
+  Mat<n, n> F_ = Mat<n, n>::Identity();
+  Mat<n, n> FP_;
+  Mat<m, n> H_ = Mat<m, n>::Zero();
+  double normalized_innovation_ = 0.0;
+};
+
+}  // namespace equipoise

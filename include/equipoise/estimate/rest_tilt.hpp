@@ -1,0 +1,31 @@
+// Tilt of a robot that is held still, from the averaged accelerometer: the estimators start from it.
+// In: gravity minus acceleration, body axes -> out: roll, pitch. RT-safe.
+#pragma once
+
+#include "equipoise/types.hpp"
+
+namespace equipoise {
+
+class RestTilt {
+ public:
+  Vec2 update(const Vec3& accel_B_m_s2) noexcept {
+    if (!accel_B_m_s2.allFinite()) return tilt();
+    // A running mean first, then an exponential one: the first estimate is already unbiased.
+    samples_ = samples_ < kWindow ? samples_ + 1 : kWindow;
+    mean_ += (accel_B_m_s2 - mean_) / samples_;
+    return tilt();
+  }
+
+  /// y = R^T (0, 0, -g): roll and pitch of R = Rz Ry Rx.
+  Vec2 tilt() const noexcept {
+    if (samples_ == 0) return Vec2::Zero();
+    return {std::atan2(-mean_.y(), -mean_.z()), std::atan2(mean_.x(), std::hypot(mean_.y(), mean_.z()))};
+  }
+
+ private:
+  static constexpr int kWindow = 100;  // ticks, 0.5 s
+  Vec3 mean_ = Vec3::Zero();
+  int samples_ = 0;
+};
+
+}  // namespace equipoise
