@@ -13,6 +13,16 @@ Vec2 slew(const Vec2& from, const Vec2& to, double step) noexcept {
 
 }  // namespace
 
+StateView view(const MbbrReference& ref, const MbbrParameters& p) noexcept {
+  StateView v;
+  v.theta_rad << ref.theta_xy, ref.theta_z;
+  v.omega_B_rad_s << ref.rate_xy, ref.yaw_rate;
+  v.phi_rad = ref.phi;
+  v.phi_dot_rad_s = ref.phi_dot_star;
+  v.position_W_m = ball_velocity(p.r, ref.phi);
+  return v;
+}
+
 void MbbrReferenceStage::reset(const MbbrEstimate& x_hat) noexcept {
   heading_zero_ = x_hat.theta_z;
   velocity_W_.setZero();
@@ -45,7 +55,8 @@ MbbrReference MbbrReferenceStage::update(const Command& command, const MbbrEstim
   ref.theta_z = theta_z_ref_;
   ref.yaw_rate = yaw_rate_;
   ref.d_phi = rotate(to_yaw, phi_ref_ - x_hat.phi);                                     // (6.8)
-  ref.d_phi_dot_unfiltered = rotate(to_yaw, phi_dot_ref) - x_hat.phi_dot_star;          // (6.9)
+  ref.phi_dot_star = rotate(to_yaw, phi_dot_ref);
+  ref.d_phi_dot_unfiltered = ref.phi_dot_star - x_hat.phi_dot_star;                     // (6.9)
   const Vec2 rate_error = inertial ? rotate(x_hat.theta_z, ref.d_phi_dot_unfiltered) : ref.d_phi_dot_unfiltered;
 
   // First-order low-pass, exact for a held input.

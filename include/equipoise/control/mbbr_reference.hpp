@@ -30,6 +30,7 @@ struct MbbrReference {
   Vec2 theta_xy = Vec2::Zero();        // lean, yaw frame
   Vec2 rate_xy = Vec2::Zero();         // its rate: body rates or Euler rates, as configured
   Vec2 phi = Vec2::Zero();             // inertial
+  Vec2 phi_dot_star = Vec2::Zero();    // yaw frame
   double theta_z = 0.0;
   double yaw_rate = 0.0;
   // Errors, reference minus estimate, yaw frame, [T] (6.6)-(6.9)
@@ -42,8 +43,13 @@ struct MbbrReference {
   double d_yaw_rate = 0.0;
 };
 
+/// Robot-neutral view of where the robot should be.
+StateView view(const MbbrReference& ref, const MbbrParameters& p) noexcept;
+
 class MbbrReferenceStage {
  public:
+  using Params = MbbrReferenceParams;
+  using Reference = MbbrReference;
   explicit MbbrReferenceStage(const MbbrReferenceParams& params) : p_(params) {}
 
   /// Start from where the robot is: called while the motors are off.

@@ -41,6 +41,8 @@ class MbbrKinematics {
   /// Ball angle (or rate) relative to the body, body axes, from wheel angles (or rates). (5.3)
   Vec3 ball_from_wheels(const Vec3& wheels) const noexcept { return (1.0 / ratio_) * (T_ob_ * wheels); }
   Vec3 wheels_from_ball(const Vec3& ball_B) const noexcept { return ratio_ * (T_ob_.transpose() * ball_B); }
+  /// Rates that Coulomb friction and back-EMF act on, about the input axes.
+  Vec3 axis_rates(const Vec3& wheel_rates) const noexcept { return ball_from_wheels(wheel_rates); }
   /// Torque on the ball (or input u), body axes, from wheel torques (or duties). (5.4), (5.14)
   Vec3 axes_from_wheels(const Vec3& wheels) const noexcept { return ratio_ * (T_ob_ * wheels); }
   Vec3 wheels_from_axes(const Vec3& axes_B) const noexcept { return (1.0 / ratio_) * (T_ob_.transpose() * axes_B); }
@@ -75,18 +77,19 @@ struct Mbbr {
   static constexpr int kWheels = 3;
   static constexpr int kInputs = 3;  // u_x, u_y, u_z
   using Parameters = MbbrParameters;
+  using Kinematics = MbbrKinematics;
   using Estimate = MbbrEstimate;
   using Sample = Measurement<kWheels>;
 };
 
-/// Robot-neutral view; `r` turns ball angles into a position.
-inline StateView view(const MbbrEstimate& x, double r) noexcept {
+/// Robot-neutral view.
+inline StateView view(const MbbrEstimate& x, const MbbrParameters& p) noexcept {
   StateView v;
   v.theta_rad << x.theta_xy, x.theta_z;
   v.omega_B_rad_s = x.omega_B;
   v.phi_rad = x.phi;
   v.phi_dot_rad_s = x.phi_dot_star;
-  v.position_W_m = ball_velocity(r, x.phi);
+  v.position_W_m = ball_velocity(p.r, x.phi);
   v.normalized_innovation = x.normalized_innovation;
   return v;
 }
