@@ -23,7 +23,9 @@ class MbbrDynamics {
  public:
   explicit MbbrDynamics(const MbbrParameters& p) noexcept;
 
-  MbbrAccelerations accelerations(const MbbrMotion& m, const Vec3& tau_B) const noexcept;
+  /// `tau_B`: torque on the ball; `push_B`: force on the body's centre of mass, N.
+  MbbrAccelerations accelerations(const MbbrMotion& m, const Vec3& tau_B,
+                                  const Vec3& push_B = Vec3::Zero()) const noexcept;
 
   /// Ball rate relative to the body, body axes: what the encoders see. [T] (5.10)
   static Vec3 encoder_rate_B(const MbbrMotion& m) noexcept;

@@ -1,0 +1,53 @@
+// What the simulated worlds of all robots share: parameters of sensors, battery, attitude packets and pushes.
+// Fidelity levels choose among them: `ideal` (rigid bodies, linear motors, perfect sensors), `thesis` (what
+// [T] section 6.3 simulated: friction and the filters' own noise), `full` (everything here). Simulation only.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "equipoise/actuate/bridge.hpp"
+#include "equipoise/sense/calibrate.hpp"
+#include "equipoise/types.hpp"
+
+namespace equipoise {
+
+enum class Fidelity { kIdeal, kThesis, kFull };
+
+/// A force on the body's centre of mass, world axes.
+struct Push {
+  double at_s = 0.0;
+  double duration_s = 0.05;
+  Vec2 force_W_N = Vec2::Zero();
+};
+
+struct WorldParams {
+  std::uint64_t seed = 1;
+  double step_s = 1e-3;  // RK4 step; five per tick
+
+  double initial_tilt_rad = 0.02;  // sigma about each axis, and of the heading
+  bool friction = true;
+  /// Share of the filter's process noise that disturbs the body each tick, [T] section 6.3.
+  Vec<10> process_noise_sigma = Vec<10>::Zero();  // theta x y z, phi x y, and their rates
+
+  double gyro_sigma_rad_s = 0.0;
+  double accel_sigma_m_s2 = 0.0;
+  double gyro_bias_sigma_rad_s = 0.0;   // constant over a run
+  double accel_bias_sigma_m_s2 = 0.0;
+  double encoder_sigma_rad = 0.0;       // of the wheel angle
+  bool quantise = false;                // encoders, IMU, ADC in whole counts; IMU range clipped
+
+  double battery_V = 8.0;
+  double battery_resistance_ohm = 0.0;
+
+  /// Attitude packets (DMP): truth, late, with a slowly wandering error and a drifting heading.
+  double attitude_sigma_rad = 0.0;
+  double attitude_time_constant_s = 3.0;
+  double attitude_heading_drift_rad_sqrt_s = 0.0;
+  int attitude_latency_ticks = 0;
+
+  std::vector<Push> pushes;
+};
+
+}  // namespace equipoise
