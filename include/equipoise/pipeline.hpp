@@ -64,7 +64,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     if (!safety_.armed()) reference_.reset(t.x_hat);
     t.ref = reference_.update(command, t.x_hat);                         // [T] 6.2.1
     t.u_lin = feedback_.update(t.ref);                                   // [T] (6.10)
-    t.u_friction = t.u_lin + p_.friction.compensate<Robot::kInputs>(axis_rates);  // [T] 6.2.2
+    t.u_friction = t.u_lin + p_.friction.compensate(axis_rates);  // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);                         // [T] 6.2.3, ch. 4
     t.motors = safety_.gate(duty, safety_inputs(raw, command, t));
     t.arm_state = safety_.state();
@@ -101,7 +101,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     if (!t.saturated) return t.u_lin;
     const double share = bridge_.supply_V(t.z.battery_V, t.z.battery_ok) / p_.motor.nominal_V;
     const Wheels limited = kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-share).cwiseMin(share);
-    return kinematics_.axes_from_wheels(limited) - p_.friction.compensate<Robot::kInputs>(axis_rates);
+    return kinematics_.axes_from_wheels(limited) - p_.friction.compensate(axis_rates);
   }
 
   SafetyInputs safety_inputs(const RawSample& raw, const Command& command, const Result& t) const noexcept {

@@ -92,7 +92,6 @@ MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B, c
 Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept {
   if (!world_.friction) return Vec3::Zero();
   const MbbrMotion m = motion(s);
-  const Vec3 relative = MbbrDynamics::encoder_rate_B(m);
   const State d = derivative(s, Vec3::Zero(), push_W);
   MbbrMotion next = m;
   next.theta_xy += world_.step_s * d.segment<2>(kTheta);

@@ -1,0 +1,51 @@
+// Everything a robot is configured with, read from one strict TOML file.
+// In: path, overrides -> out: typed parameters; ConfigError (file:line: key: reason and allowed range) otherwise.
+// Start-up only.
+#pragma once
+
+#include <array>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "equipoise/control/mbbr_reference.hpp"
+#include "equipoise/control/mbbr_thesis_feedback.hpp"
+#include "equipoise/estimate/mbbr_estimators.hpp"
+#include "equipoise/pipeline.hpp"
+#include "equipoise/plant/world.hpp"
+
+namespace equipoise {
+
+struct ConfigError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+inline const std::vector<std::string> kFidelityNames{"ideal", "thesis", "full"};
+
+using MbbrThesisPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrThesisFeedback>;
+
+struct MbbrConfig {
+  MbbrParameters robot;
+  MotorParameters motor;
+  Calibration calibration;
+  FrictionCompensation friction;
+  MbbrEstimatorParams estimators;
+  MbbrReferenceParams reference;
+  MbbrThesisFeedbackParams thesis;
+  SafetyParams safety;
+  std::array<WorldParams, 3> world;         // by Fidelity
+  std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
+
+  MbbrThesisPipeline::Params thesis_pipeline() const;
+};
+
+/// Name of the robot a file is for, without reading the rest.
+std::string robot_type(const std::string& path);
+
+struct LoadedMbbr {
+  MbbrConfig config;
+  std::string sha256;  // of the effective configuration
+};
+LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& overrides);
+
+}  // namespace equipoise

@@ -1,0 +1,205 @@
+#include "toml_reader.hpp"
+
+#include <sodium.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+namespace equipoise::config {
+namespace {
+
+std::string at(const std::string& path, const toml::source_region& where) {
+  if (where.begin.line == 0) return path;
+  return path + ":" + std::to_string(where.begin.line);
+}
+
+std::string shortest(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+std::string range(double min, double max) { return "allowed: " + shortest(min) + " to " + shortest(max); }
+
+/// Edit distance, for "did you mean".
+std::size_t distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t next = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U)});
+      diagonal = row[j];
+      row[j] = next;
+    }
+  }
+  return row[b.size()];
+}
+
+void apply_override(toml::table& root, const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw ConfigError("--set " + text + ": expected key=value, e.g. --set friction.compensation=0.8");
+  }
+  toml::table patch;
+  try {
+    patch = toml::parse(text.substr(0, equals) + " = " + text.substr(equals + 1));
+  } catch (const toml::parse_error&) {
+    try {  // a bare word is a string
+      patch = toml::parse(text.substr(0, equals) + " = \"" + text.substr(equals + 1) + "\"");
+    } catch (const toml::parse_error& error) {
+      throw ConfigError("--set " + text + ": " + std::string(error.description()));
+    }
+  }
+  toml::table* target = &root;
+  const toml::table* source = &patch;
+  for (;;) {
+    const auto first = source->begin();
+    const toml::key& key = first->first;
+    const toml::node& value = first->second;
+    if (!target->contains(key)) {
+      throw ConfigError("--set " + text + ": no such key in the configuration");
+    }
+    if (value.is_table() && target->get(key)->is_table()) {
+      target = target->get_as<toml::table>(key.str());
+      source = value.as_table();
+      continue;
+    }
+    value.visit([&](const auto& v) { target->insert_or_assign(key, v); });
+    return;
+  }
+}
+
+}  // namespace
+
+Document::Document(const std::string& path, const std::vector<std::string>& overrides) : path_(path) {
+  std::ifstream file(path);
+  if (!file) throw ConfigError(path + ": cannot be opened; give a configuration with --config FILE");
+  try {
+    root_ = toml::parse(file, path);
+  } catch (const toml::parse_error& error) {
+    throw ConfigError(at(path, error.source()) + ": " + std::string(error.description()));
+  }
+  for (const std::string& text : overrides) apply_override(root_, text);
+}
+
+std::string Document::sha256() const {
+  if (sodium_init() < 0) throw ConfigError("libsodium could not be initialised");
+  std::ostringstream canonical;
+  canonical << root_;  // keys are sorted in a toml::table
+  const std::string bytes = canonical.str();
+  std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
+  crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  std::array<char, 2 * crypto_hash_sha256_BYTES + 1> hex{};
+  sodium_bin2hex(hex.data(), hex.size(), digest.data(), digest.size());
+  return hex.data();
+}
+
+void Section::fail(const std::string& key, const std::string& what) const {
+  const toml::node* found = table_.get(key);
+  const std::string where = at(document_.path(), found != nullptr ? found->source() : table_.source());
+  throw ConfigError(where + ": " + (name_.empty() ? key : name_ + "." + key) + ": " + what);
+}
+
+const toml::node& Section::node(const std::string& key) {
+  asked_.insert(key);
+  const toml::node* found = table_.get(key);
+  if (found == nullptr) fail(key, "missing");
+  return *found;
+}
+
+Section Section::table(const std::string& key) {
+  const toml::table* found = node(key).as_table();
+  if (found == nullptr) fail(key, "expected a table");
+  return Section(document_, *found, name_.empty() ? key : name_ + "." + key);
+}
+
+std::vector<Section> Section::tables(const std::string& key, std::size_t min, std::size_t max) {
+  const toml::array* array = node(key).as_array();
+  if (array == nullptr || (!array->empty() && !array->is_array_of_tables())) fail(key, "expected an array of tables");
+  if (array->size() < min || array->size() > max) {
+    fail(key, std::to_string(array->size()) + " entries; allowed: " + std::to_string(min) + " to " + std::to_string(max));
+  }
+  std::vector<Section> sections;
+  for (std::size_t i = 0; i < array->size(); ++i) {
+    sections.emplace_back(document_, *array->get_as<toml::table>(i),
+                          (name_.empty() ? key : name_ + "." + key) + "[" + std::to_string(i) + "]");
+  }
+  return sections;
+}
+
+double Section::number(const std::string& key, double min, double max) {
+  const auto value = node(key).value<double>();
+  if (!value) fail(key, "expected a number");
+  if (!std::isfinite(*value) || *value < min || *value > max) fail(key, shortest(*value) + " is out of range; " + range(min, max));
+  return *value;
+}
+
+int Section::integer(const std::string& key, int min, int max) {
+  const auto value = node(key).value_exact<std::int64_t>();
+  if (!value) fail(key, "expected a whole number");
+  if (*value < min || *value > max) fail(key, std::to_string(*value) + " is out of range; " + range(min, max));
+  return static_cast<int>(*value);
+}
+
+bool Section::boolean(const std::string& key) {
+  const auto value = node(key).value_exact<bool>();
+  if (!value) fail(key, "expected true or false");
+  return *value;
+}
+
+std::string Section::text(const std::string& key) {
+  const auto value = node(key).value_exact<std::string>();
+  if (!value) fail(key, "expected a string");
+  return *value;
+}
+
+std::size_t Section::choice(const std::string& key, const std::vector<std::string>& names) {
+  const std::string value = text(key);
+  const auto found = std::find(names.begin(), names.end(), value);
+  if (found == names.end()) {
+    std::string allowed;
+    for (const std::string& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
+    fail(key, "\"" + value + "\" is not known; allowed: " + allowed);
+  }
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+std::vector<double> Section::numbers(const std::string& key, std::size_t count, double min, double max) {
+  const toml::array* array = node(key).as_array();
+  if (array == nullptr || array->size() != count) fail(key, "expected an array of " + std::to_string(count) + " numbers");
+  std::vector<double> values;
+  for (const toml::node& element : *array) {
+    const auto value = element.value<double>();
+    if (!value) fail(key, "expected an array of " + std::to_string(count) + " numbers");
+    if (!std::isfinite(*value) || *value < min || *value > max) {
+      fail(key, shortest(*value) + " is out of range; " + range(min, max));
+    }
+    values.push_back(*value);
+  }
+  return values;
+}
+
+void Section::finish() const {
+  for (const auto& [key, value] : table_) {
+    const std::string name(key.str());
+    if (asked_.count(name) != 0) continue;
+    std::string hint;
+    std::size_t best = 4;
+    for (const std::string& known : asked_) {
+      const std::size_t d = distance(name, known);
+      if (d < best) {
+        best = d;
+        hint = "; did you mean " + known + "?";
+      }
+    }
+    throw ConfigError(at(document_.path(), value.source()) + ": " + (name_.empty() ? name : name_ + "." + name) +
+                      ": unknown key" + hint);
+  }
+}
+
+}  // namespace equipoise::config

@@ -1,0 +1,67 @@
+// Strict reading of a TOML file: every key must be known, present and within its range.
+// Errors are ConfigError with file, line, key, and what is allowed. Start-up only.
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "equipoise/config.hpp"
+
+namespace equipoise::config {
+
+/// Whole file with `--set` overrides applied; knows where every value stands.
+class Document {
+ public:
+  Document(const std::string& path, const std::vector<std::string>& overrides);
+
+  const toml::table& root() const { return root_; }
+  const std::string& path() const { return path_; }
+  /// SHA-256, hex, of the effective configuration.
+  std::string sha256() const;
+
+ private:
+  std::string path_;
+  toml::table root_;
+};
+
+/// One table; `finish` refuses keys that nobody asked for.
+class Section {
+ public:
+  Section(const Document& document, const toml::table& table, std::string name)
+      : document_(document), table_(table), name_(std::move(name)) {}
+
+  Section table(const std::string& key);
+  bool has(const std::string& key) const { return table_.contains(key); }
+  /// Array of tables.
+  std::vector<Section> tables(const std::string& key, std::size_t min, std::size_t max);
+
+  double number(const std::string& key, double min, double max);
+  int integer(const std::string& key, int min, int max);
+  bool boolean(const std::string& key);
+  std::string text(const std::string& key);
+  /// Index of the value in `names`.
+  std::size_t choice(const std::string& key, const std::vector<std::string>& names);
+  std::vector<double> numbers(const std::string& key, std::size_t count, double min, double max);
+
+  template <int N>
+  Vec<N> vector(const std::string& key, double min, double max) {
+    const std::vector<double> values = numbers(key, static_cast<std::size_t>(N), min, max);
+    return Eigen::Map<const Vec<N>>(values.data());
+  }
+
+  void finish() const;
+  [[noreturn]] void fail(const std::string& key, const std::string& what) const;
+
+ private:
+  const toml::node& node(const std::string& key);
+
+  const Document& document_;
+  const toml::table& table_;
+  std::string name_;
+  std::set<std::string> asked_;
+};
+
+}  // namespace equipoise::config
