@@ -199,7 +199,9 @@ LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& ov
 
   Section estimator = root.table("estimator");
   read_filter<KalmanFilter<MbbrModel10>::Params, 10, 8>(estimator.table("ekf"), c.estimators.ekf);
-  read_filter<KalmanFilter<MbbrPublishedModel>::Params, 13, 8>(estimator.table("ekf13"), c.estimators.ekf13);
+  read_filter<KalmanFilter<MbbrModel13>::Params, 13, 8>(estimator.table("ekf13"), c.estimators.ekf13);
+  read_filter<KalmanFilter<MbbrPublishedModel>::Params, 13, 8>(estimator.table("ekf13_published"),
+                                                               c.estimators.ekf13_published);
   read_filter<KalmanFilter<MbbrLinearModel>::Params, 8, 6>(estimator.table("kf_attitude"), c.estimators.kf);
   estimator.finish();
   c.estimators.robot = c.robot;

@@ -3,15 +3,6 @@
 namespace equipoise {
 namespace {
 
-template <class Model>
-typename KalmanFilter<MbbrModel13>::Params same_tuning(const Model& p) {
-  KalmanFilter<MbbrModel13>::Params q;
-  q.Q = p.Q;
-  q.R = p.R;
-  q.initial_variance = p.initial_variance;
-  return q;
-}
-
 template <class Filter, std::size_t M>
 void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y, const std::array<bool, M>& use) noexcept {
   filter.predict(u);
@@ -26,8 +17,8 @@ MbbrEstimators::MbbrEstimators(const Params& params)
     : params_(params),
       kinematics_(params.robot),
       ekf_(MbbrModel10(params.robot), params.ekf),
-      ekf13_published_(MbbrPublishedModel{}, params.ekf13),
-      ekf13_(MbbrModel13(params.robot), same_tuning(params.ekf13)),
+      ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
+      ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(MbbrLinearModel(params.robot), params.kf) {}
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {

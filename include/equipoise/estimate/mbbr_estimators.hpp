@@ -22,7 +22,8 @@ struct MbbrEstimatorParams {
   MbbrEstimatorId active = MbbrEstimatorId::kEkf;
   bool compare = false;  // run all of them, not only the active one
   KalmanFilter<MbbrModel10>::Params ekf;
-  KalmanFilter<MbbrPublishedModel>::Params ekf13;  // both 13-state filters
+  KalmanFilter<MbbrPublishedModel>::Params ekf13_published;
+  KalmanFilter<MbbrModel13>::Params ekf13;
   KalmanFilter<MbbrLinearModel>::Params kf;
   MbbrParameters robot;
 };

@@ -1,0 +1,68 @@
+// What the real-time thread hands over once per tick: one trivially copyable record.
+// In: the tick's inputs and results -> out: scalars and arrays for telemetry, log and replay. RT-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+
+#include "equipoise/samples.hpp"
+
+namespace equipoise::runtime {
+
+inline constexpr std::size_t kMaxEstimators = 8;
+
+/// StateView without Eigen.
+struct StateRecord {
+  std::array<double, 3> theta_rad;
+  std::array<double, 3> omega_B_rad_s;
+  std::array<double, 2> phi_rad;
+  std::array<double, 2> phi_dot_rad_s;
+  std::array<double, 2> position_W_m;
+  double normalized_innovation;
+};
+
+inline StateRecord to_record(const StateView& v) noexcept {
+  return {{v.theta_rad.x(), v.theta_rad.y(), v.theta_rad.z()},
+          {v.omega_B_rad_s.x(), v.omega_B_rad_s.y(), v.omega_B_rad_s.z()},
+          {v.phi_rad.x(), v.phi_rad.y()},
+          {v.phi_dot_rad_s.x(), v.phi_dot_rad_s.y()},
+          {v.position_W_m.x(), v.position_W_m.y()},
+          v.normalized_innovation};
+}
+
+struct TickRecord {
+  std::int64_t tick;
+  std::int64_t now_ns;  // loop clock; simulated time in simulation
+  RawSample raw;
+  // command
+  std::array<double, 2> velocity_W_m_s;
+  double yaw_rate_rad_s;
+  bool arm;
+  bool heading_reset;
+  // states: the controlling estimate, the reference, the truth, and the estimators side by side
+  StateRecord estimate;
+  StateRecord reference;
+  StateRecord truth;
+  bool has_truth;
+  std::uint32_t compared;  // bit i: others[i] is filled
+  std::array<StateRecord, kMaxEstimators> others;
+  // motors
+  std::array<double, 3> u_lin;
+  std::array<double, 3> u_friction;
+  std::array<double, kMaxMotors> duty;
+  bool enable;
+  bool saturated;
+  // health
+  std::int32_t arm_state;
+  std::uint32_t reasons;
+  double battery_V;
+  // timing
+  std::int64_t wake_late_ns;
+  std::int64_t compute_ns;
+  std::int64_t overruns;
+};
+
+static_assert(std::is_trivially_copyable_v<TickRecord>, "the hand-over is a memcpy");
+
+}  // namespace equipoise::runtime

@@ -1,0 +1,33 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "app/commands.hpp"
+#include "equipoise/config.hpp"
+
+/// Exit codes: 0 success, 1 a job that failed, 2 bad usage or input.
+int main(int argc, char** argv) {
+  CLI::App app{"Equipoise: firmware and simulator of two balancing robots"};
+  app.set_version_flag("--version", EQUIPOISE_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough(false);
+  int status = 0;
+  equipoise::app::add_commands(app, &status);
+  try {
+    app.parse(argc, argv);
+    return status;
+  } catch (const CLI::ParseError& error) {
+    const bool help = error.get_exit_code() == 0;
+    app.exit(error);
+    return help ? 0 : 2;
+  } catch (const equipoise::ConfigError& error) {
+    std::fprintf(stderr, "equipoise: %s\n", error.what());
+    return 2;
+  } catch (const equipoise::app::InputError& error) {
+    std::fprintf(stderr, "equipoise: %s\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "equipoise: %s\n", error.what());
+    return 1;
+  }
+}
