@@ -1,6 +1,6 @@
 // Everything a robot is configured with, read from one strict TOML file.
-// In: path, overrides -> out: typed parameters; ConfigError (file:line: key: reason and allowed range) otherwise.
-// Start-up only.
+// In: path, overrides -> out: typed parameters; ConfigError (file:line: key: reason and allowed range)
+// otherwise. Start-up only.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ struct MbbrConfig {
   MbbrReferenceParams reference;
   MbbrThesisFeedbackParams thesis;
   SafetyParams safety;
-  std::array<WorldParams, 3> world;         // by Fidelity
+  std::array<WorldParams, 3> world;          // by Fidelity
   std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
 
   MbbrThesisPipeline::Params thesis_pipeline() const;
@@ -45,6 +45,7 @@ std::string robot_type(const std::string& path);
 struct LoadedMbbr {
   MbbrConfig config;
   std::string sha256;  // of the effective configuration
+  std::string toml;    // the effective configuration
 };
 LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& overrides);
 

@@ -62,10 +62,10 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
     t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
     if (!safety_.armed()) reference_.reset(t.x_hat);
-    t.ref = reference_.update(command, t.x_hat);                         // [T] 6.2.1
-    t.u_lin = feedback_.update(t.ref);                                   // [T] (6.10)
+    t.ref = reference_.update(command, t.x_hat);                  // [T] 6.2.1
+    t.u_lin = feedback_.update(t.ref);                            // [T] (6.10)
     t.u_friction = t.u_lin + p_.friction.compensate(axis_rates);  // [T] 6.2.2
-    const MotorCommand duty = invert_bridges(t);                         // [T] 6.2.3, ch. 4
+    const MotorCommand duty = invert_bridges(t);                  // [T] 6.2.3, ch. 4
     t.motors = safety_.gate(duty, safety_inputs(raw, command, t));
     t.arm_state = safety_.state();
     t.reasons = safety_.reasons();
@@ -92,8 +92,8 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     return motors;
   }
 
-  /// What the estimators' linear model has felt: the command before compensation, [T] section 6.1, as far as the
-  /// supply allowed it; with coasting motors, the input that just cancels the back-EMF.
+  /// What the estimators' linear model has felt: the command before compensation, [T] section 6.1, as far as
+  /// the supply allowed it; with coasting motors, the input that just cancels the back-EMF.
   Input applied_input(const Result& t, const Input& axis_rates) const noexcept {
     if (!t.motors.enable) {
       return kinematics_.axes_from_wheels(t.z.wheel_rate_rad_s / p_.motor.no_load_rad_s(p_.motor.nominal_V));
@@ -113,9 +113,10 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.attitude_ok = t.z.attitude_ok;
     in.battery_V = t.z.battery_V;
     in.arm_requested = command.arm;
-    in.all_finite = finite(raw) && command.velocity_W_m_s.allFinite() && std::isfinite(command.yaw_rate_rad_s) &&
-                    in.state.theta_rad.allFinite() && in.state.omega_B_rad_s.allFinite() &&
-                    in.state.phi_rad.allFinite() && in.state.phi_dot_rad_s.allFinite() && t.u_friction.allFinite();
+    in.all_finite = finite(raw) && command.velocity_W_m_s.allFinite() &&
+                    std::isfinite(command.yaw_rate_rad_s) && in.state.theta_rad.allFinite() &&
+                    in.state.omega_B_rad_s.allFinite() && in.state.phi_rad.allFinite() &&
+                    in.state.phi_dot_rad_s.allFinite() && t.u_friction.allFinite();
     return in;
   }
 
@@ -123,8 +124,8 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     const auto all = [](const auto& values) {
       return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
     };
-    return all(raw.gyro_counts) && all(raw.accel_counts) && all(raw.encoder_counts) && all(raw.attitude_wxyz) &&
-           std::isfinite(raw.battery_counts);
+    return all(raw.gyro_counts) && all(raw.accel_counts) && all(raw.encoder_counts) &&
+           all(raw.attitude_wxyz) && std::isfinite(raw.battery_counts);
   }
 
   Params p_;

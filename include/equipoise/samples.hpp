@@ -32,7 +32,7 @@ template <int Wheels>
 struct Measurement {
   std::int64_t t_ns = 0;
   Vec3 gyro_B_rad_s = Vec3::Zero();
-  Vec3 accel_B_m_s2 = Vec3::Zero();                    // [T] (5.26): gravity minus acceleration; at rest z = -9.8
+  Vec3 accel_B_m_s2 = Vec3::Zero();  // [T] (5.26): gravity minus acceleration; at rest z = -9.8
   Vec<Wheels> wheel_angle_rad = Vec<Wheels>::Zero();   // relative to the body
   Vec<Wheels> wheel_rate_rad_s = Vec<Wheels>::Zero();  // six-point slope, [T] (6.20)
   double battery_V = 0.0;

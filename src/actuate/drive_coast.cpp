@@ -39,8 +39,9 @@ double scaled_current(double t, double b, double d) noexcept {
 
 /// Solves scaled_current(t) = target; returns v T_r.
 double solve_exponent(double target, double b, double d, double exponent_max, int* iterations) noexcept {
-  const double bound = b * target - b * std::log(b) / d;  // v T_r if the current decayed completely, from above
-  constexpr double kDecayed = 45.0;                       // exp(-45) is below one ulp
+  const double bound =
+      b * target - b * std::log(b) / d;  // v T_r if the current decayed completely, from above
+  constexpr double kDecayed = 45.0;      // exp(-45) is below one ulp
   if (bound > kDecayed && b * target > kDecayed) return bound;
 
   constexpr double kSeriesStartBelow = 1.2;
@@ -81,10 +82,10 @@ double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept {
   const double w = std::clamp(sign * omega_r, -1.0, 1.0);
   const double b = 0.5 * (1.0 + w);
   const double d = 0.5 * (1.0 - w);
-  if (v == 0.0) return 0.0;                                                        // (4.28)
-  if (v > boundary_duty(T_r, b, d)) return sign * (2.0 * v - 1.0 - w);             // (4.29)
-  if (T_r <= 0.0) return 0.0;                                                      // (4.30), T_r -> 0
-  const double decay = std::log1p(d / b * -std::expm1(-v * T_r));                  // (4.30)
+  if (v == 0.0) return 0.0;                                             // (4.28)
+  if (v > boundary_duty(T_r, b, d)) return sign * (2.0 * v - 1.0 - w);  // (4.29)
+  if (T_r <= 0.0) return 0.0;                                           // (4.30), T_r -> 0
+  const double decay = std::log1p(d / b * -std::expm1(-v * T_r));       // (4.30)
   return sign * 2.0 * (v * d - b / T_r * decay);
 }
 

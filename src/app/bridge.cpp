@@ -29,7 +29,8 @@ nlohmann::json evaluate(const nlohmann::json& row) {
 }  // namespace
 
 void add_bridge(CLI::App& app, int* status) {
-  auto* command = app.add_subcommand("bridge", "Mean current of a drive/coast bridge, and its inverse, on rows of JSON");
+  auto* command =
+      app.add_subcommand("bridge", "Mean current of a drive/coast bridge, and its inverse, on rows of JSON");
   auto in = std::make_shared<std::string>();
   auto json = std::make_shared<std::string>("-");
   command->add_option("--in", *in, "rows of {T_r, omega_r, u} or {T_r, omega_r, i_over_is}")->required();

@@ -4,7 +4,8 @@
 namespace equipoise::app {
 
 void add_geometry(CLI::App& app, int* status) {
-  auto* command = app.add_subcommand("geometry", "Orthogonal omniwheel placement: tilt, axes, load, torque shares");
+  auto* command =
+      app.add_subcommand("geometry", "Orthogonal omniwheel placement: tilt, axes, load, torque shares");
   auto alpha_deg = std::make_shared<double>(60.0);
   auto azimuth_deg = std::make_shared<double>(-140.0);
   auto json = std::make_shared<std::string>();

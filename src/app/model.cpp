@@ -48,22 +48,27 @@ nlohmann::json evaluate_mip(const MipDynamics& dynamics, const nlohmann::json& r
 }  // namespace
 
 void add_model(CLI::App& app, int* status) {
-  auto* command = app.add_subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON");
+  auto* command =
+      app.add_subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON");
   auto robot = std::make_shared<std::string>();
   auto in = std::make_shared<std::string>();
   auto json = std::make_shared<std::string>("-");
   command->add_option("--robot", *robot, "mbbr or mip")->required()->check(CLI::IsMember({"mbbr", "mip"}));
-  command->add_option("--in", *in, "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
-                                   "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}")
+  command
+      ->add_option("--in", *in,
+                   "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
+                   "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}")
       ->required();
   command->add_option("--json", *json, "output file, - for stdout")->capture_default_str();
   command->callback([=] {
     if (*robot == "mbbr") {
       const MbbrDynamics dynamics{MbbrParameters{}};
-      write_json(map_rows(*in, [&](const nlohmann::json& row) { return evaluate_mbbr(dynamics, row); }), *json);
+      write_json(map_rows(*in, [&](const nlohmann::json& row) { return evaluate_mbbr(dynamics, row); }),
+                 *json);
     } else {
       const MipDynamics dynamics{MipParameters{}};
-      write_json(map_rows(*in, [&](const nlohmann::json& row) { return evaluate_mip(dynamics, row); }), *json);
+      write_json(map_rows(*in, [&](const nlohmann::json& row) { return evaluate_mip(dynamics, row); }),
+                 *json);
     }
     *status = 0;
   });

@@ -98,7 +98,8 @@ GainSchedule<Columns> read_schedule(Section& parent, const std::string& key,
     if (hz <= previous) row.fail("yaw_hz", "rows must ascend");
     previous = hz;
     schedule.at[schedule.rows] = hz * kTwoPi;
-    for (std::size_t c = 0; c < Columns; ++c) schedule.row[schedule.rows][c] = row.number(names[c], -1e3, 1e3);
+    for (std::size_t c = 0; c < Columns; ++c)
+      schedule.row[schedule.rows][c] = row.number(names[c], -1e3, 1e3);
     row.finish();
     ++schedule.rows;
   }
@@ -109,7 +110,8 @@ MbbrReferenceParams read_reference(Section s, double ball_radius_m) {
   MbbrReferenceParams p;
   p.slc_unit = s.number("slc_unit_rad_per_rad_s", 0.0, 1.0);
   p.slc_sign = s.number("slc_sign", -1.0, 1.0);
-  p.rate_feedback = s.choice("rate_feedback", {"body", "euler"}) == 0 ? RateFeedback::kBody : RateFeedback::kEuler;
+  p.rate_feedback =
+      s.choice("rate_feedback", {"body", "euler"}) == 0 ? RateFeedback::kBody : RateFeedback::kEuler;
   p.frame = s.choice("filter_frame", {"inertial", "yaw"}) == 0 ? FilterFrame::kInertial : FilterFrame::kYaw;
   p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
   p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
@@ -123,7 +125,8 @@ MbbrReferenceParams read_reference(Section s, double ball_radius_m) {
 MbbrThesisFeedbackParams read_thesis(Section s) {
   MbbrThesisFeedbackParams p;
   p.yaw_feedforward_s = s.number("yaw_feedforward_s", -1.0, 1.0);
-  p.schedule = read_schedule<MbbrThesisFeedbackParams::kColumns>(s, "gains", {"c1", "c2", "c3", "c4", "c5", "c6"});
+  p.schedule =
+      read_schedule<MbbrThesisFeedbackParams::kColumns>(s, "gains", {"c1", "c2", "c3", "c4", "c5", "c6"});
   s.finish();
   return p;
 }
@@ -188,7 +191,8 @@ LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& ov
   MbbrConfig& c = loaded.config;
 
   Section robot = root.table("robot");
-  if (robot.text("type") != "mbbr") robot.fail("type", "\"" + robot.text("type") + "\" is not this robot; expected mbbr");
+  if (robot.text("type") != "mbbr")
+    robot.fail("type", "\"" + robot.text("type") + "\" is not this robot; expected mbbr");
   c.robot = read_robot(robot);
   c.motor = read_motor(root.table("motor"));
   c.calibration = read_calibration(root.table("calibration"));
@@ -219,6 +223,7 @@ LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& ov
   world.finish();
   root.finish();
   loaded.sha256 = document.sha256();
+  loaded.toml = document.canonical();
   return loaded;
 }
 

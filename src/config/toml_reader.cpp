@@ -32,7 +32,8 @@ std::size_t distance(const std::string& a, const std::string& b) {
     std::size_t diagonal = row[0];
     row[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t next = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U)});
+      const std::size_t next =
+          std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U)});
       diagonal = row[j];
       row[j] = next;
     }
@@ -87,11 +88,15 @@ Document::Document(const std::string& path, const std::vector<std::string>& over
   for (const std::string& text : overrides) apply_override(root_, text);
 }
 
+std::string Document::canonical() const {
+  std::ostringstream text;
+  text << root_;  // keys are sorted in a toml::table
+  return text.str();
+}
+
 std::string Document::sha256() const {
   if (sodium_init() < 0) throw ConfigError("libsodium could not be initialised");
-  std::ostringstream canonical;
-  canonical << root_;  // keys are sorted in a toml::table
-  const std::string bytes = canonical.str();
+  const std::string bytes = canonical();
   std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
   crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   std::array<char, 2 * crypto_hash_sha256_BYTES + 1> hex{};
@@ -120,9 +125,11 @@ Section Section::table(const std::string& key) {
 
 std::vector<Section> Section::tables(const std::string& key, std::size_t min, std::size_t max) {
   const toml::array* array = node(key).as_array();
-  if (array == nullptr || (!array->empty() && !array->is_array_of_tables())) fail(key, "expected an array of tables");
+  if (array == nullptr || (!array->empty() && !array->is_array_of_tables()))
+    fail(key, "expected an array of tables");
   if (array->size() < min || array->size() > max) {
-    fail(key, std::to_string(array->size()) + " entries; allowed: " + std::to_string(min) + " to " + std::to_string(max));
+    fail(key, std::to_string(array->size()) + " entries; allowed: " + std::to_string(min) + " to " +
+                  std::to_string(max));
   }
   std::vector<Section> sections;
   for (std::size_t i = 0; i < array->size(); ++i) {
@@ -135,14 +142,16 @@ std::vector<Section> Section::tables(const std::string& key, std::size_t min, st
 double Section::number(const std::string& key, double min, double max) {
   const auto value = node(key).value<double>();
   if (!value) fail(key, "expected a number");
-  if (!std::isfinite(*value) || *value < min || *value > max) fail(key, shortest(*value) + " is out of range; " + range(min, max));
+  if (!std::isfinite(*value) || *value < min || *value > max)
+    fail(key, shortest(*value) + " is out of range; " + range(min, max));
   return *value;
 }
 
 int Section::integer(const std::string& key, int min, int max) {
   const auto value = node(key).value_exact<std::int64_t>();
   if (!value) fail(key, "expected a whole number");
-  if (*value < min || *value > max) fail(key, std::to_string(*value) + " is out of range; " + range(min, max));
+  if (*value < min || *value > max)
+    fail(key, std::to_string(*value) + " is out of range; " + range(min, max));
   return static_cast<int>(*value);
 }
 
@@ -171,7 +180,8 @@ std::size_t Section::choice(const std::string& key, const std::vector<std::strin
 
 std::vector<double> Section::numbers(const std::string& key, std::size_t count, double min, double max) {
   const toml::array* array = node(key).as_array();
-  if (array == nullptr || array->size() != count) fail(key, "expected an array of " + std::to_string(count) + " numbers");
+  if (array == nullptr || array->size() != count)
+    fail(key, "expected an array of " + std::to_string(count) + " numbers");
   std::vector<double> values;
   for (const toml::node& element : *array) {
     const auto value = element.value<double>();
@@ -197,8 +207,8 @@ void Section::finish() const {
         hint = "; did you mean " + known + "?";
       }
     }
-    throw ConfigError(at(document_.path(), value.source()) + ": " + (name_.empty() ? name : name_ + "." + name) +
-                      ": unknown key" + hint);
+    throw ConfigError(at(document_.path(), value.source()) + ": " +
+                      (name_.empty() ? name : name_ + "." + name) + ": unknown key" + hint);
   }
 }
 

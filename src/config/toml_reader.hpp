@@ -19,7 +19,8 @@ class Document {
 
   const toml::table& root() const { return root_; }
   const std::string& path() const { return path_; }
-  /// SHA-256, hex, of the effective configuration.
+  /// The effective configuration, and its SHA-256 in hex.
+  std::string canonical() const;
   std::string sha256() const;
 
  private:

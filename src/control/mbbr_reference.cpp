@@ -54,10 +54,11 @@ MbbrReference MbbrReferenceStage::update(const Command& command, const MbbrEstim
   ref.phi = phi_ref_;
   ref.theta_z = theta_z_ref_;
   ref.yaw_rate = yaw_rate_;
-  ref.d_phi = rotate(to_yaw, phi_ref_ - x_hat.phi);                                     // (6.8)
+  ref.d_phi = rotate(to_yaw, phi_ref_ - x_hat.phi);  // (6.8)
   ref.phi_dot_star = rotate(to_yaw, phi_dot_ref);
-  ref.d_phi_dot_unfiltered = ref.phi_dot_star - x_hat.phi_dot_star;                     // (6.9)
-  const Vec2 rate_error = inertial ? rotate(x_hat.theta_z, ref.d_phi_dot_unfiltered) : ref.d_phi_dot_unfiltered;
+  ref.d_phi_dot_unfiltered = ref.phi_dot_star - x_hat.phi_dot_star;  // (6.9)
+  const Vec2 rate_error =
+      inertial ? rotate(x_hat.theta_z, ref.d_phi_dot_unfiltered) : ref.d_phi_dot_unfiltered;
 
   // First-order low-pass, exact for a held input.
   const double blend = 1.0 - std::exp(-row[MbbrReferenceParams::kLowPassRadS] * kTickS);
@@ -66,7 +67,8 @@ MbbrReference MbbrReferenceStage::update(const Command& command, const MbbrEstim
 
   // (6.13): the lean of this tick follows from the errors up to the last one.
   ref.theta_xy = inertial ? rotate(to_yaw, lean_) : lean_;
-  // (6.12). In the inertial frame the change of the lean is, resolved in the yaw frame, the body rate it asks for.
+  // (6.12). In the inertial frame the change of the lean is, resolved in the yaw frame, the body rate it asks
+  // for.
   const bool body = p_.rate_feedback == RateFeedback::kBody;
   const Vec2 lean_now = body ? rotate(x_hat.theta_z, ref.theta_xy) : ref.theta_xy;
   const Vec2 lean_rate = (lean_now - lean_previous_) / kTickS;
@@ -75,7 +77,7 @@ MbbrReference MbbrReferenceStage::update(const Command& command, const MbbrEstim
   lean_ = row[MbbrReferenceParams::kSlcPole] * lean_ +
           p_.slc_sign * row[MbbrReferenceParams::kSlcGain] * p_.slc_unit * rate_error;
 
-  ref.d_theta = ref.theta_xy - x_hat.theta_xy;                                          // (6.7)
+  ref.d_theta = ref.theta_xy - x_hat.theta_xy;  // (6.7)
   ref.d_rate = ref.rate_xy - (body ? x_hat.omega_B.head<2>() : x_hat.theta_dot.head<2>());
   ref.d_theta_z = theta_z_ref_ - x_hat.theta_z;
   ref.d_yaw_rate = yaw_rate_ - x_hat.theta_dot.z();

@@ -4,7 +4,8 @@ namespace equipoise {
 namespace {
 
 template <class Filter, std::size_t M>
-void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y, const std::array<bool, M>& use) noexcept {
+void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
+          const std::array<bool, M>& use) noexcept {
   filter.predict(u);
   filter.update(u, y, use);
 }
@@ -100,7 +101,8 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
     from_13(Id::kEkf13, ekf13_.x(), ekf13_.normalized_innovation());
   }
 
-  if (runs(Id::kKfAttitude)) {  // [T] section 6.4.6: attitude from its source, the rest from the linear filter
+  if (runs(
+          Id::kKfAttitude)) {  // [T] section 6.4.6: attitude from its source, the rest from the linear filter
     Vec<6> y6;
     y6 << z.gyro_B_rad_s.head<2>(), phi_B.head<2>(), z.accel_B_m_s2.head<2>();
     step(kf_, u, y6, std::array<bool, 6>{i, i, e, e, i, i});
@@ -114,7 +116,8 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
       integrate(Id::kKfAttitude, z.gyro_B_rad_s.z());
       attitude_heading_ += kTickS * z.gyro_B_rad_s.z();
     }
-    out.omega_B << x.segment<2>(4), z.gyro_B_rad_s.z();  // the filter's theta' is a smoothed gyro: a body rate
+    out.omega_B << x.segment<2>(4),
+        z.gyro_B_rad_s.z();  // the filter's theta' is a smoothed gyro: a body rate
     out.theta_dot = euler_rates(out.theta_xy, out.omega_B);
     out.phi_dot_star = x.tail<2>();
     out.normalized_innovation = kf_.normalized_innovation();

@@ -65,10 +65,12 @@ void MbbrHighYaw::inertial_rows(const MbbrCoefficients& c, const State& x, const
 namespace {
 
 /// d(phi_B)/dt to first order in the tilt, [T] (5.31) with the -theta_y it drops in h5.
-/// Returns the three rates without the -theta_x', -theta_y' that the encoder rows carry as -theta_x, -theta_y.
+/// Returns the three rates without the -theta_x', -theta_y' that the encoder rows carry as -theta_x,
+/// -theta_y.
 Vec3 encoder_sums_rate(const MbbrHighYaw::State& x) noexcept {
   using I = MbbrHighYaw;
-  return {x(I::kPhiDotX) + x(I::kThetaY) * x(I::kThetaDotZ), x(I::kPhiDotY) - x(I::kThetaX) * x(I::kThetaDotZ),
+  return {x(I::kPhiDotX) + x(I::kThetaY) * x(I::kThetaDotZ),
+          x(I::kPhiDotY) - x(I::kThetaX) * x(I::kThetaDotZ),
           x(I::kThetaY) * x(I::kPhiDotX) - x(I::kThetaX) * x(I::kPhiDotY) - x(I::kThetaDotZ)};
 }
 

@@ -2,7 +2,8 @@
 
 namespace equipoise {
 
-void MbbrPublishedModel::predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_next, Mat<13, 13>& F) const noexcept {
+void MbbrPublishedModel::predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_next,
+                                 Mat<13, 13>& F) const noexcept {
   const double tx = x(kThetaX), ty = x(kThetaY);
   const double dtx = x(kThetaDotX), dty = x(kThetaDotY), dtz = x(kThetaDotZ);
   const double dpx = x(kPhiDotX), dpy = x(kPhiDotY);
@@ -21,8 +22,8 @@ void MbbrPublishedModel::predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_nex
       -15 * dtz - 220 * uz + dpx * (14 * ty + 0.015 * dty) - dpy * (5.2 * tx + 0.015 * dtx) +
           dtz * (0.012 * tx * dpx + 0.015 * ty * dpy) + 7.5 * ty * ux - 140 * tx * uy,
       f7L + dtz * (-6.5 * ty + 0.44 * dty - 0.0062 * dpy) + 0.44 * tx * dtz * dtz + 400 * ty * uz,
-      f8L + dtz * (6.5 * tx - 0.44 * dtx + 0.0062 * dpx) + 0.44 * ty * dtz * dtz - 400 * tx * uz,
-      ty * dtz, -tx * dtz, ty * dpx - tx * dpy;
+      f8L + dtz * (6.5 * tx - 0.44 * dtx + 0.0062 * dpx) + 0.44 * ty * dtz * dtz - 400 * tx * uz, ty * dtz,
+      -tx * dtz, ty * dpx - tx * dpy;
 
   Mat<13, 13> A = Mat<13, 13>::Zero();
   for (int i = 0; i < 5; ++i) A(i, i + kThetaDotX) = 1.0;

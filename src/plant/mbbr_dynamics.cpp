@@ -74,7 +74,8 @@ Vec3 MbbrDynamics::accelerometer_B(const MbbrMotion& m, const MbbrAccelerations&
   const Mat3 R = tilt_rotation(m.theta_xy);
   const Vec2 ball = ball_velocity(p_.r, a.phi_ddot_inertial);
   const Vec3 gravity_minus_ball(-ball.x(), -ball.y(), -kGravity_m_s2);
-  return R.transpose() * gravity_minus_ball - a.omega_dot_B.cross(p_.l_a) - m.omega_B.cross(m.omega_B.cross(p_.l_a));
+  return R.transpose() * gravity_minus_ball - a.omega_dot_B.cross(p_.l_a) -
+         m.omega_B.cross(m.omega_B.cross(p_.l_a));
 }
 
 Vec2 MbbrDynamics::phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept {

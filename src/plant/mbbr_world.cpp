@@ -19,8 +19,8 @@ std::array<double, 4> quaternion(const Vec3& theta) {
 
 }  // namespace
 
-MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor, const Calibration& calibration,
-                     const WorldParams& world)
+MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
+                     const Calibration& calibration, const WorldParams& world)
     : robot_(robot),
       motor_(motor),
       calibration_(calibration),
@@ -67,7 +67,8 @@ Vec3 MbbrWorld::motor_torque_B(const Vec3& relative_rate_B) const noexcept {
   return kinematics_.axes_from_wheels(torque);
 }
 
-MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept {
+MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B,
+                                       const Vec2& push_W) const noexcept {
   const MbbrMotion m = motion(s);
   const Vec3 relative = MbbrDynamics::encoder_rate_B(m);
   Vec3 tau = motor_torque_B(relative) + friction_B;
@@ -88,7 +89,8 @@ MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B, c
   return d;
 }
 
-/// Per axis, the constant torque that would end this step at rest, limited to mu_c: sticking and sliding in one rule.
+/// Per axis, the constant torque that would end this step at rest, limited to mu_c: sticking and sliding in
+/// one rule.
 Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept {
   if (!world_.friction) return Vec3::Zero();
   const MbbrMotion m = motion(s);
@@ -171,7 +173,8 @@ void MbbrWorld::sense_attitude() {
   const double keep = std::exp(-kTickS / tau);
   const double kick = world_.attitude_sigma_rad * std::sqrt(1.0 - keep * keep);
   attitude_error_.head<2>() = keep * attitude_error_.head<2>() + attitude_noise_.gaussian_vector<2>(kick);
-  attitude_error_.z() += attitude_noise_.gaussian(world_.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS));
+  attitude_error_.z() +=
+      attitude_noise_.gaussian(world_.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS));
   attitude_head_ = (attitude_head_ + 1) % kAttitudeDelay;
   attitude_history_[attitude_head_] = s_.segment<3>(kTheta) + attitude_error_;
 }

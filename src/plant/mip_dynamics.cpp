@@ -14,11 +14,14 @@ Vec3 MipDynamics::accelerations(const MipMotion& m, double tau_sum, double tau_d
   const double m11 = p_.I_b1 + p_.l * lm + 2.0 * lm * p_.r * c + wheels;
   const double m12 = wheels + lm * p_.r * c;
   const double m22 = wheels;
-  const double m33 = p_.I_b3 + 2.0 * p_.I_w3 + C * s * s + 0.5 * p_.d * p_.d * (p_.I_w1 / (p_.r * p_.r) + p_.m_w);
+  const double m33 =
+      p_.I_b3 + 2.0 * p_.I_w3 + C * s * s + 0.5 * p_.d * p_.d * (p_.I_w1 / (p_.r * p_.r) + p_.m_w);
 
-  const double b1 = s * (C * c * m.psi_dot * m.psi_dot + lm * (kGravity_m_s2 + p_.r * m.theta_dot * m.theta_dot));
+  const double b1 =
+      s * (C * c * m.psi_dot * m.psi_dot + lm * (kGravity_m_s2 + p_.r * m.theta_dot * m.theta_dot));
   const double b2 = tau_sum + lm * p_.r * s * m.theta_dot * m.theta_dot;
-  const double b3 = 0.5 * p_.d / p_.r * tau_difference - C * std::sin(2.0 * m.theta) * m.psi_dot * m.theta_dot;
+  const double b3 =
+      0.5 * p_.d / p_.r * tau_difference - C * std::sin(2.0 * m.theta) * m.psi_dot * m.theta_dot;
 
   const double det = m11 * m22 - m12 * m12;
   return {(m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det, b3 / m33};
@@ -38,7 +41,8 @@ Vec3 MipDynamics::accelerometer_B(const MipMotion& m, const Vec3& qdd, const Vec
   const Vec3 in_body(gravity_minus_axle.x(), c * gravity_minus_axle.y() + s * gravity_minus_axle.z(),
                      -s * gravity_minus_axle.y() + c * gravity_minus_axle.z());
   const Vec3 omega(m.theta_dot, s * m.psi_dot, c * m.psi_dot);
-  const Vec3 omega_dot(qdd(0), s * qdd(2) + c * m.theta_dot * m.psi_dot, c * qdd(2) - s * m.theta_dot * m.psi_dot);
+  const Vec3 omega_dot(qdd(0), s * qdd(2) + c * m.theta_dot * m.psi_dot,
+                       c * qdd(2) - s * m.theta_dot * m.psi_dot);
   const Vec3 arm = Vec3(0.0, 0.0, p_.l) + offset_B;
   return in_body - omega_dot.cross(arm) - omega.cross(omega.cross(arm));
 }

@@ -11,6 +11,7 @@
 #include <equipoise/command_t.hpp>
 #include <equipoise/health_t.hpp>
 #include <equipoise/motors_t.hpp>
+#include <equipoise/run_t.hpp>
 #include <equipoise/sensors_t.hpp>
 #include <equipoise/state_t.hpp>
 #include <equipoise/timing_t.hpp>
@@ -60,12 +61,14 @@ class Telemetry::Writer {
       lcm_ = lcm_create(options.url.c_str());
       report_->publishing = lcm_ != nullptr;
       if (lcm_ == nullptr) {
-        report_->warning = "telemetry " + options.url +
-                           " cannot be opened (is there a route for multicast? ip route add 224.0.0.0/4 dev lo); "
-                           "going on without it";
+        report_->warning =
+            "telemetry " + options.url +
+            " cannot be opened (is there a route for multicast? ip route add 224.0.0.0/4 dev lo); "
+            "going on without it";
       }
     }
     for (const std::string& name : options.estimators) channels_.push_back("EQUIPOISE_STATE_" + upper(name));
+    announce(options.run);
   }
 
   ~Writer() {
@@ -107,7 +110,8 @@ class Telemetry::Writer {
       const int fd = dup(fileno(log_->f));
       lcm_eventlog_destroy(log_);
       if (fd >= 0) {
-        if (ftruncate(fd, static_cast<off_t>(whole_bytes_)) != 0) report_->log_error += "; its last event is torn";
+        if (ftruncate(fd, static_cast<off_t>(whole_bytes_)) != 0)
+          report_->log_error += "; its last event is torn";
         close(fd);
       }
     } else {
@@ -120,7 +124,7 @@ class Telemetry::Writer {
   template <class Message>
   void emit(const char* channel, Message& message) {
     message.utime = utime_;
-    message.tick = tick_;
+    if constexpr (!std::is_same_v<Message, run_t>) message.tick = tick_;
     const int size = message.getEncodedSize();
     buffer_.resize(static_cast<std::size_t>(size));
     message.encode(buffer_.data(), 0, size);
@@ -153,6 +157,21 @@ class Telemetry::Writer {
   void fail_log(int error) {
     if (log_failed_->exchange(true)) return;
     report_->log_error = options_.log_path + ": log stopped: " + std::strerror(error != 0 ? error : EIO);
+  }
+
+  void announce(const RunInfo& run) {
+    run_t m{};
+    m.seed = run.seed;
+    m.rolling_radius_m = run.rolling_radius_m;
+    m.robot = run.robot;
+    m.estimator = run.estimator;
+    m.controller = run.controller;
+    m.fidelity = run.fidelity;
+    m.version = run.version;
+    m.config_sha256 = run.config_sha256;
+    m.config_toml = run.config_toml;
+    publish_now_ = lcm_ != nullptr;
+    emit("EQUIPOISE_RUN", m);
   }
 
   void sensors(const TickRecord& r) {

@@ -1,6 +1,6 @@
-// From wanted linear duty to the bridge's command, per motor. In: u in nominal-voltage units, wheel rate, battery
-// voltage -> out: duty in [-1, 1]. Scales by V_nominal/V_battery, then inverts the bridge: drive/brake is linear,
-// drive/coast is [T] chapter 4. Stateless, RT-safe, bounded iterations.
+// From wanted linear duty to the bridge's command, per motor. In: u in nominal-voltage units, wheel rate,
+// battery voltage -> out: duty in [-1, 1]. Scales by V_nominal/V_battery, then inverts the bridge:
+// drive/brake is linear, drive/coast is [T] chapter 4. Stateless, RT-safe, bounded iterations.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,8 @@
-// The only place that decides whether motors may run. In: wanted duties, robot-neutral state, sensor flags, command
-// -> out: what the bridges get, and why not. Motors start disarmed; they arm on request while everything is well, and
-// any fault disarms them in the same tick. After a fault the request has to be withdrawn and made again.
-// RT-safe.
+// The only place that decides whether motors may run. In: wanted duties, robot-neutral state, sensor flags,
+// command
+// -> out: what the bridges get, and why not. Motors start disarmed; they arm on request while everything is
+// well, and any fault disarms them in the same tick. After a fault the request has to be withdrawn and made
+// again. RT-safe.
 #pragma once
 
 #include <cstdint>
@@ -25,13 +26,13 @@ enum SafetyReason : std::uint32_t {
 };
 
 struct SafetyParams {
-  double max_tilt_rad = 0.60;          // beyond it the wheels cannot catch the body
-  double max_arm_tilt_rad = 0.20;      // and to start
-  double max_arm_rate_rad_s = 2.0;     // body rate at which arming is refused
-  int max_missed_samples = 2;          // consecutive ticks without a valid IMU or encoder sample
-  int max_attitude_age_ticks = 10;     // where the controller needs the attitude source
+  double max_tilt_rad = 0.60;       // beyond it the wheels cannot catch the body
+  double max_arm_tilt_rad = 0.20;   // and to start
+  double max_arm_rate_rad_s = 2.0;  // body rate at which arming is refused
+  int max_missed_samples = 2;       // consecutive ticks without a valid IMU or encoder sample
+  int max_attitude_age_ticks = 10;  // where the controller needs the attitude source
   bool needs_attitude = false;
-  double min_battery_V = 6.0;          // two LiPo cells; sampled over kBatteryTicks
+  double min_battery_V = 6.0;  // two LiPo cells; sampled over kBatteryTicks
 };
 
 struct SafetyInputs {

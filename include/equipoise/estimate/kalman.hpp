@@ -1,7 +1,7 @@
 // Extended Kalman filter on a model with a diagonal measurement covariance.
 // In: input, measurements with a mask of those to use -> state, covariance, normalised innovation.
-// Measurements are applied one scalar at a time in Joseph form, which equals the batch update for diagonal R and
-// keeps P symmetric to the bit without a matrix inverse. RT-safe: fixed size, bounded.
+// Measurements are applied one scalar at a time in Joseph form, which equals the batch update for diagonal R
+// and keeps P symmetric to the bit without a matrix inverse. RT-safe: fixed size, bounded.
 //
 // A Model supplies kStates, kInputs, kOutputs and
 //   void predict(const Vec<n>& x, const Vec<p>& u, Vec<n>& x_next, Mat<n, n>& F) const noexcept;
@@ -27,7 +27,9 @@ class KalmanFilter {
     double initial_variance = 1e-4;
   };
 
-  KalmanFilter(const Model& model, const Params& params) : model_(model), params_(params) { reset(Vec<n>::Zero()); }
+  KalmanFilter(const Model& model, const Params& params) : model_(model), params_(params) {
+    reset(Vec<n>::Zero());
+  }
 
   void reset(const Vec<n>& x) noexcept {
     x_ = x;
@@ -59,8 +61,8 @@ class KalmanFilter {
       const double innovation = y(i) - y_hat(i) - h.dot(x_ - x_prior);
       const Vec<n> k = Ph / s;
       x_ += k * innovation;
-      // (I - k h') P (I - k h')' + k r k', expanded so that every pair (i, j), (j, i) rounds alike: an asymmetry of
-      // one ulp grows by nine decades in 250 ticks at 1 Hz of yaw.
+      // (I - k h') P (I - k h')' + k r k', expanded so that every pair (i, j), (j, i) rounds alike: an
+      // asymmetry of one ulp grows by nine decades in 250 ticks at 1 Hz of yaw.
       for (int j = 0; j < n; ++j) {
         P_.col(j) += (k * k(j)) * s - (k * Ph(j) + Ph * k(j));
       }

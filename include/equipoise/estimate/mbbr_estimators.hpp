@@ -1,7 +1,8 @@
 // The MBBR's estimators, side by side on the same samples.
-// In: Measurement, the input applied since the last one -> out: MbbrEstimate per estimator. Each integrates the
-// inertial ball angles from its own rates, [T] (6.3)-(6.4); the drift is reported, not hidden. While the robot is
-// held (motors off) the tilt comes from the averaged accelerometer and the filters are kept at rest. RT-safe.
+// In: Measurement, the input applied since the last one -> out: MbbrEstimate per estimator. Each integrates
+// the inertial ball angles from its own rates, [T] (6.3)-(6.4); the drift is reported, not hidden. While the
+// robot is held (motors off) the tilt comes from the averaged accelerometer and the filters are kept at rest.
+// RT-safe.
 #pragma once
 
 #include <array>
@@ -15,8 +16,8 @@
 namespace equipoise {
 
 enum class MbbrEstimatorId : int { kEkf, kEkf13Published, kEkf13, kKfAttitude, kTruth };
-inline constexpr std::array<const char*, 5> kMbbrEstimatorNames{"ekf", "ekf13_published", "ekf13", "kf_attitude",
-                                                                "truth"};
+inline constexpr std::array<const char*, 5> kMbbrEstimatorNames{"ekf", "ekf13_published", "ekf13",
+                                                                "kf_attitude", "truth"};
 
 struct MbbrEstimatorParams {
   MbbrEstimatorId active = MbbrEstimatorId::kEkf;

@@ -1,8 +1,9 @@
 // The corrected high-yaw-rate model of the MBBR, in the 13 printed states and in its 10 observable ones.
-// Accelerations and accelerometer rows come from the derivation script (config/generated/mbbr_model.hpp); this file
-// adds the kinematics, the encoder rows, [T] (5.31)-(5.33), the transport term of the turning frame that [T] lacks,
-// and explicit Euler, (6.1). f and h see phi*, theta_z and x11..x13 only through phi_x* + x11, phi_y* + x12 and
-// x13 - theta_z, so three of the 13 states are unobservable; the 10-state form keeps just these sums. RT-safe.
+// Accelerations and accelerometer rows come from the derivation script (config/generated/mbbr_model.hpp);
+// this file adds the kinematics, the encoder rows, [T] (5.31)-(5.33), the transport term of the turning frame
+// that [T] lacks, and explicit Euler, (6.1). f and h see phi*, theta_z and x11..x13 only through phi_x* +
+// x11, phi_y* + x12 and x13 - theta_z, so three of the 13 states are unobservable; the 10-state form keeps
+// just these sums. RT-safe.
 #pragma once
 
 #include "equipoise/robots/mbbr.hpp"
@@ -13,8 +14,8 @@ namespace equipoise {
 using MbbrCoefficients = generated::mbbr::Coefficients<double>;
 MbbrCoefficients mbbr_coefficients(const MbbrParameters& p) noexcept;
 
-/// What both forms share: accelerations with transport, gyro and accelerometer rows, and their Jacobians in the
-/// seven dynamic variables (theta_x, theta_y, theta_x', theta_y', theta_z', phi_x*', phi_y*').
+/// What both forms share: accelerations with transport, gyro and accelerometer rows, and their Jacobians in
+/// the seven dynamic variables (theta_x, theta_y, theta_x', theta_y', theta_z', phi_x*', phi_y*').
 struct MbbrHighYaw {
   using State = Vec<7>;
   enum Index : int { kThetaX, kThetaY, kThetaDotX, kThetaDotY, kThetaDotZ, kPhiDotX, kPhiDotY };
@@ -57,11 +58,12 @@ class MbbrModel13 {
   MbbrCoefficients c_;
 };
 
-/// Linear model: the same at zero yaw rate, two decoupled pendulums, [T] (5.27)-(5.29) with derived coefficients.
+/// Linear model: the same at zero yaw rate, two decoupled pendulums, [T] (5.27)-(5.29) with derived
+/// coefficients.
 class MbbrLinearModel {
  public:
-  static constexpr int kStates = 8;  // theta_x, theta_y, phi_x*, phi_y*, and their rates
-  static constexpr int kInputs = 3;  // u_z unused
+  static constexpr int kStates = 8;   // theta_x, theta_y, phi_x*, phi_y*, and their rates
+  static constexpr int kInputs = 3;   // u_z unused
   static constexpr int kOutputs = 6;  // gyro x, y, encoder x, y, accelerometer x, y
 
   explicit MbbrLinearModel(const MbbrParameters& p) noexcept;

@@ -1,7 +1,7 @@
-// The MBBR's simulated world: exact rolling dynamics in RK4, three motors behind their bridges, friction, sensors.
-// In: motor command per tick -> out: raw samples, and the truth. A hand holds the body until the motors are first
-// enabled. Coulomb friction is a torque held over each step: the one that stops the axis, at most mu_c.
-// Simulation only; allocates nothing after construction; same seed, same bytes.
+// The MBBR's simulated world: exact rolling dynamics in RK4, three motors behind their bridges, friction,
+// sensors. In: motor command per tick -> out: raw samples, and the truth. A hand holds the body until the
+// motors are first enabled. Coulomb friction is a torque held over each step: the one that stops the axis, at
+// most mu_c. Simulation only; allocates nothing after construction; same seed, same bytes.
 #pragma once
 
 #include <array>

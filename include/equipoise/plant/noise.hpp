@@ -1,5 +1,5 @@
-// Seeded noise, one independent stream per effect, so that switching one effect leaves the others' draws alone.
-// Same seed, same numbers on one machine. Simulation only.
+// Seeded noise, one independent stream per effect, so that switching one effect leaves the others' draws
+// alone. Same seed, same numbers on one machine. Simulation only.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,8 @@ namespace equipoise {
 
 class NoiseStream {
  public:
-  NoiseStream(std::uint64_t seed, std::uint64_t effect) : engine_(mix(seed * 0x9E3779B97F4A7C15ULL + effect)) {}
+  NoiseStream(std::uint64_t seed, std::uint64_t effect)
+      : engine_(mix(seed * 0x9E3779B97F4A7C15ULL + effect)) {}
 
   double gaussian(double sigma) { return sigma * normal_(engine_); }
   double uniform(double low, double high) {

@@ -33,10 +33,10 @@ struct WorldParams {
 
   double gyro_sigma_rad_s = 0.0;
   double accel_sigma_m_s2 = 0.0;
-  double gyro_bias_sigma_rad_s = 0.0;   // constant over a run
+  double gyro_bias_sigma_rad_s = 0.0;  // constant over a run
   double accel_bias_sigma_m_s2 = 0.0;
-  double encoder_sigma_rad = 0.0;       // of the wheel angle
-  bool quantise = false;                // encoders, IMU, ADC in whole counts; IMU range clipped
+  double encoder_sigma_rad = 0.0;  // of the wheel angle
+  bool quantise = false;           // encoders, IMU, ADC in whole counts; IMU range clipped
 
   double battery_V = 8.0;
   double battery_resistance_ohm = 0.0;

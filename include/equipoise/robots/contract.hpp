@@ -18,20 +18,23 @@ struct RobotContract {
   using Wheels = Vec<Robot::kWheels>;
 
   static_assert(Robot::kWheels >= 1 && Robot::kWheels <= kMaxMotors, "a robot drives one to four motors");
-  static_assert(std::is_same_v<Sample, Measurement<Robot::kWheels>>, "Sample is the Measurement of its wheels");
+  static_assert(std::is_same_v<Sample, Measurement<Robot::kWheels>>,
+                "Sample is the Measurement of its wheels");
   static_assert(std::is_constructible_v<Kinematics, const typename Robot::Parameters&>,
                 "Kinematics is built from Parameters");
   static_assert(
       std::is_same_v<decltype(std::declval<const Kinematics&>().axis_rates(std::declval<Wheels>())), Input>,
       "Kinematics::axis_rates maps wheel rates to the input axes");
   static_assert(
-      std::is_same_v<decltype(std::declval<const Kinematics&>().wheels_from_axes(std::declval<Input>())), Wheels>,
+      std::is_same_v<decltype(std::declval<const Kinematics&>().wheels_from_axes(std::declval<Input>())),
+                     Wheels>,
       "Kinematics::wheels_from_axes maps inputs to wheels");
   static_assert(
-      std::is_same_v<decltype(std::declval<const Kinematics&>().axes_from_wheels(std::declval<Wheels>())), Input>,
+      std::is_same_v<decltype(std::declval<const Kinematics&>().axes_from_wheels(std::declval<Wheels>())),
+                     Input>,
       "Kinematics::axes_from_wheels maps wheels to inputs");
-  static_assert(std::is_same_v<decltype(std::declval<Estimators&>().update(std::declval<const Sample&>(),
-                                                                           std::declval<const Input&>(), bool())),
+  static_assert(std::is_same_v<decltype(std::declval<Estimators&>().update(
+                                   std::declval<const Sample&>(), std::declval<const Input&>(), bool())),
                                const Estimate&>,
                 "Estimators::update(sample, input, held) returns the controlling estimate");
   static_assert(noexcept(std::declval<Estimators&>().update(std::declval<const Sample&>(),

@@ -11,20 +11,20 @@ namespace equipoise {
 
 /// Physical parameters, SI. Defaults: [T] Table 5.2.
 struct MbbrParameters {
-  double m_t = 0.550;    // top body mass
-  double m_b = 0.150;    // ball mass
-  double r = 0.032;      // ball radius
-  double r_w = 0.0125;   // omniwheel radius
-  double l = 0.100;      // ball centre to body centre of mass
+  double m_t = 0.550;     // top body mass
+  double m_b = 0.150;     // ball mass
+  double r = 0.032;       // ball radius
+  double r_w = 0.0125;    // omniwheel radius
+  double l = 0.100;       // ball centre to body centre of mass
   double I_t1 = 2.42e-3;  // body inertia about its centre of mass, body axes
   double I_t2 = 2.42e-3;
   double I_t3 = 0.79e-3;
-  double I_b = 8.46e-5;    // ball inertia
-  double I_w = 1.20e-5;    // three wheels, as seen about the ball (physics: the printed value already is)
-  double k1 = 0.176;       // torque per unit of u about the ball's axes, nominal battery
-  double k2_ball = 0.011;  // back-EMF about the ball, k2 (r/r_w)^2
-  double mu_c = 0.05265;   // Coulomb friction about each body axis, [T] section 5.3
-  double mu_v = 0.001056;  // viscous friction
+  double I_b = 8.46e-5;       // ball inertia
+  double I_w = 1.20e-5;       // three wheels, as seen about the ball (physics: the printed value already is)
+  double k1 = 0.176;          // torque per unit of u about the ball's axes, nominal battery
+  double k2_ball = 0.011;     // back-EMF about the ball, k2 (r/r_w)^2
+  double mu_c = 0.05265;      // Coulomb friction about each body axis, [T] section 5.3
+  double mu_v = 0.001056;     // viscous friction
   Vec3 l_a{0.0, 0.0, 0.130};  // ball centre to IMU, body axes
   double alpha_deg = 60.0;    // wheel latitude from the north pole
   double azimuth_deg = -140.0;
@@ -45,7 +45,9 @@ class MbbrKinematics {
   Vec3 axis_rates(const Vec3& wheel_rates) const noexcept { return ball_from_wheels(wheel_rates); }
   /// Torque on the ball (or input u), body axes, from wheel torques (or duties). (5.4), (5.14)
   Vec3 axes_from_wheels(const Vec3& wheels) const noexcept { return ratio_ * (T_ob_ * wheels); }
-  Vec3 wheels_from_axes(const Vec3& axes_B) const noexcept { return (1.0 / ratio_) * (T_ob_.transpose() * axes_B); }
+  Vec3 wheels_from_axes(const Vec3& axes_B) const noexcept {
+    return (1.0 / ratio_) * (T_ob_.transpose() * axes_B);
+  }
 
   const Mat3& T_ob() const noexcept { return T_ob_; }
 
@@ -66,8 +68,12 @@ struct MbbrEstimate {
 };
 
 /// Ball rates (yaw frame) -> velocity of the ball's centre in the same frame, [T] (5.9).
-inline Vec2 ball_velocity(double r, const Vec2& phi_dot) noexcept { return {r * phi_dot.y(), -r * phi_dot.x()}; }
-inline Vec2 ball_rate(double r, const Vec2& velocity) noexcept { return {-velocity.y() / r, velocity.x() / r}; }
+inline Vec2 ball_velocity(double r, const Vec2& phi_dot) noexcept {
+  return {r * phi_dot.y(), -r * phi_dot.x()};
+}
+inline Vec2 ball_rate(double r, const Vec2& velocity) noexcept {
+  return {-velocity.y() / r, velocity.x() / r};
+}
 
 /// Body rates from Euler angles and their rates, [T] (A.13), and back.
 Vec3 body_rates(const Vec2& theta_xy, const Vec3& theta_dot) noexcept;

@@ -1,7 +1,7 @@
 // Omniwheel placement on the ball: latitude alpha from the north pole, tilt beta about the contact normal.
-// In: alpha, azimuth -> beta for mutually orthogonal wheels and T_ob, whose columns are the wheel axes in body axes.
-// Source: [T] (2.3)-(2.5); beta in closed form, cos(beta) = 1/(sqrt(3) sin(alpha)).
-// Not for the tick (trigonometry at start-up only); no allocation.
+// In: alpha, azimuth -> beta for mutually orthogonal wheels and T_ob, whose columns are the wheel axes in
+// body axes. Source: [T] (2.3)-(2.5); beta in closed form, cos(beta) = 1/(sqrt(3) sin(alpha)). Not for the
+// tick (trigonometry at start-up only); no allocation.
 #pragma once
 
 #include <Eigen/Dense>
@@ -15,8 +15,8 @@ inline double orthogonal_beta_rad(double alpha_rad) noexcept {
   return std::acos(1.0 / (std::sqrt(3.0) * std::sin(alpha_rad)));
 }
 
-/// T_ob = [w1 w2 w3], orthonormal if beta = orthogonal_beta_rad(alpha). `azimuth_rad` turns all wheels about z;
-/// alpha = 60 deg, azimuth = -140 deg give [T] (6.5).
+/// T_ob = [w1 w2 w3], orthonormal if beta = orthogonal_beta_rad(alpha). `azimuth_rad` turns all wheels about
+/// z; alpha = 60 deg, azimuth = -140 deg give [T] (6.5).
 inline Mat3 wheel_axes(double alpha_rad, double beta_rad, double azimuth_rad) noexcept {
   // Axis in the tangent plane at the contact: along the rising meridian, tilted by beta towards the parallel.
   const Vec3 meridian(std::cos(alpha_rad), 0.0, std::sin(alpha_rad));
@@ -29,7 +29,9 @@ inline Mat3 wheel_axes(double alpha_rad, double beta_rad, double azimuth_rad) no
 }
 
 /// Load on one wheel per unit weight, [T] (2.2).
-inline double normal_force_over_weight(double alpha_rad) noexcept { return 1.0 / (3.0 * std::cos(alpha_rad)); }
+inline double normal_force_over_weight(double alpha_rad) noexcept {
+  return 1.0 / (3.0 * std::cos(alpha_rad));
+}
 
 /// Half the angle between the torque axes of a double-row wheel's rows, [T] (2.1).
 inline double row_wobble_rad(double row_spacing_m, double ball_radius_m) noexcept {

@@ -1,6 +1,6 @@
-// The control loop: wait, read, tick, write, hand over. In: anything that waits, reads and writes (Io), a pipeline,
-// a source of commands, an observer of each tick, a stop flag -> out: why it ended. Motors are off on every way out.
-// RT-safe as far as Io, source and observer are.
+// The control loop: wait, read, tick, write, hand over. In: anything that waits, reads and writes (Io), a
+// pipeline, a source of commands, an observer of each tick, a stop flag -> out: why it ended. Motors are off
+// on every way out. RT-safe as far as Io, source and observer are.
 #pragma once
 
 #include <atomic>

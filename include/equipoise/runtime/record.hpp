@@ -61,6 +61,7 @@ struct TickRecord {
   std::int64_t wake_late_ns;
   std::int64_t compute_ns;
   std::int64_t overruns;
+  std::int64_t dropped_records;
 };
 
 static_assert(std::is_trivially_copyable_v<TickRecord>, "the hand-over is a memcpy");

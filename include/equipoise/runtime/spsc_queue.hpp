@@ -1,6 +1,6 @@
 // Lock-free queue between one producer and one consumer; wait-free for both.
-// In: push(value) -> false if full, never blocks. Out: pop(value) -> false if empty. RT-safe: memory is allocated at
-// construction only.
+// In: push(value) -> false if full, never blocks. Out: pop(value) -> false if empty. RT-safe: memory is
+// allocated at construction only.
 #pragma once
 
 #include <atomic>

@@ -8,16 +8,16 @@
 namespace equipoise {
 
 struct Calibration {
-  double gyro_rad_s_per_count = kPi / 180.0 / 16.4;        // MPU-9250 at +-2000 deg/s
-  double accel_m_s2_per_count = kGravity_m_s2 / 4096.0;    // MPU-9250 at +-8 g
-  double battery_V_per_count = 1.8 / 4095.0 * 11.0;        // Robotics Cape divider on AIN6
+  double gyro_rad_s_per_count = kPi / 180.0 / 16.4;      // MPU-9250 at +-2000 deg/s
+  double accel_m_s2_per_count = kGravity_m_s2 / 4096.0;  // MPU-9250 at +-8 g
+  double battery_V_per_count = 1.8 / 4095.0 * 11.0;      // Robotics Cape divider on AIN6
   double battery_offset_V = -0.10;
-  double encoder_counts_per_rev = 720.0;                   // 15 slits x 4 edges x 12:1
+  double encoder_counts_per_rev = 720.0;  // 15 slits x 4 edges x 12:1
   std::array<double, kMaxMotors> encoder_sign{1, 1, 1, 1};
   std::array<double, kMaxMotors> motor_sign{1, 1, 1, 1};
-  Mat3 R_BS = Mat3::Identity();                            // sensor axes to body axes
+  Mat3 R_BS = Mat3::Identity();  // sensor axes to body axes
   Vec3 gyro_bias_B_rad_s = Vec3::Zero();
-  Vec3 accel_bias_B_m_s2 = Vec3::Zero();                   // of the specific force
+  Vec3 accel_bias_B_m_s2 = Vec3::Zero();  // of the specific force
 };
 
 /// Roll, pitch, yaw of R = Rz Ry Rx.
@@ -28,7 +28,8 @@ inline Vec3 euler_angles(const Mat3& R_WB) noexcept {
 
 /// Rotation matrix of a quaternion (w, x, y, z), normalised; NaN from a zero quaternion.
 inline Mat3 rotation(const std::array<double, 4>& wxyz) noexcept {
-  const double norm = std::sqrt(wxyz[0] * wxyz[0] + wxyz[1] * wxyz[1] + wxyz[2] * wxyz[2] + wxyz[3] * wxyz[3]);
+  const double norm =
+      std::sqrt(wxyz[0] * wxyz[0] + wxyz[1] * wxyz[1] + wxyz[2] * wxyz[2] + wxyz[3] * wxyz[3]);
   const double w = wxyz[0] / norm;
   const double x = wxyz[1] / norm;
   const double y = wxyz[2] / norm;

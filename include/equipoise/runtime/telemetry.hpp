@@ -1,0 +1,81 @@
+// Takes one record per tick from the real-time thread and, on a thread of its own, writes it to an LCM event
+// log and publishes it. In: TickRecord, lock-free -> out: log file, LCM messages (package equipoise).
+// hand_over() is RT-safe; everything else is not. A telemetry URL that cannot be opened is a warning, never a
+// reason not to fly; a log that cannot be written is reported by finish() and by log_failed().
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "equipoise/runtime/record.hpp"
+#include "equipoise/runtime/spsc_queue.hpp"
+
+namespace equipoise::runtime {
+
+/// Stays on this host: time to live 0.
+inline constexpr const char* kDefaultTelemetryUrl = "udpm://239.255.76.67:7667?ttl=0";
+
+/// What a log is a log of: its first event.
+struct RunInfo {
+  std::string robot;
+  std::string estimator;
+  std::string controller;
+  std::string fidelity;  // empty on hardware
+  std::int64_t seed = 0;
+  double rolling_radius_m = 0.0;
+  std::string version;
+  std::string config_sha256;
+  std::string config_toml;
+};
+
+struct TelemetryOptions {
+  std::string log_path;                 // empty: no log
+  std::string url;                      // LCM provider; empty: nothing is published
+  double max_publish_hz = 100.0;        // of wall-clock time; the log always has every tick
+  bool wait_when_full = false;          // simulation faster than real time: wait rather than drop
+  std::vector<std::string> estimators;  // names of TickRecord::others
+  RunInfo run;
+};
+
+struct TelemetryReport {
+  std::int64_t records = 0;
+  std::int64_t dropped = 0;
+  bool publishing = false;
+  std::string warning;    // telemetry could not be opened
+  std::string log_error;  // the log ends early, and why; what is in it is whole
+};
+
+class Telemetry {
+ public:
+  /// Throws std::runtime_error if the log cannot be created.
+  explicit Telemetry(const TelemetryOptions& options);
+  ~Telemetry();
+  Telemetry(const Telemetry&) = delete;
+  Telemetry& operator=(const Telemetry&) = delete;
+
+  void hand_over(const TickRecord& record) noexcept;
+  bool log_failed() const noexcept { return log_failed_.load(std::memory_order_relaxed); }
+  std::int64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+
+  /// Drains, closes and joins; further records are ignored.
+  TelemetryReport finish();
+
+ private:
+  class Writer;
+  void run();
+
+  TelemetryOptions options_;
+  SpscQueue<TickRecord> queue_;
+  TelemetryReport report_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> log_failed_{false};
+  std::atomic<std::int64_t> dropped_{0};
+  std::unique_ptr<Writer> writer_;
+  std::thread thread_;
+};
+
+}  // namespace equipoise::runtime

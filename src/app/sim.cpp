@@ -1,0 +1,217 @@
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <thread>
+
+#include "commands.hpp"
+#include "equipoise/runtime/telemetry.hpp"
+#include "simulate.hpp"
+
+namespace equipoise::app {
+namespace {
+
+std::atomic<bool> interrupted{false};
+void on_signal(int) { interrupted.store(true); }
+
+struct Arguments {
+  std::string config;
+  SimOptions options;
+  std::string estimator = "ekf";
+  std::string controller = "thesis";
+  std::string fidelity = "full";
+  std::string attitude = "dmp";
+  std::vector<std::string> set;
+  std::string log;
+  std::string json;
+  bool realtime = false;
+  std::string telemetry = runtime::kDefaultTelemetryUrl;
+};
+
+nlohmann::json to_json(const Arguments& a, const SimSummary& s, const std::string& config_sha256) {
+  nlohmann::json estimators = nlohmann::json::object();
+  for (const auto& [name, errors] : s.estimators) {
+    estimators[name] = {{"attitude_rmse_rad", errors.attitude_rmse_rad},
+                        {"ball_speed_rmse_m_s", errors.ball_speed_rmse_m_s}};
+  }
+  return {{"robot", "mbbr"},
+          {"seed", a.options.seed},
+          {"estimator", a.estimator},
+          {"controller", a.controller},
+          {"fidelity", a.fidelity},
+          {"attitude", a.attitude},
+          {"yaw_hz", a.options.yaw_hz},
+          {"drive_mps", a.options.drive_mps},
+          {"duration_s", static_cast<double>(s.ticks) * kTickS},
+          {"fell", s.fell},
+          {"fell_at_s", s.fell ? nlohmann::json(s.fell_at_s) : nlohmann::json(nullptr)},
+          {"attitude_rmse_rad", s.controlling.attitude_rmse_rad},
+          {"ball_speed_rmse_m_s", s.controlling.ball_speed_rmse_m_s},
+          {"position_rmse_m", s.position_rmse_m},
+          {"yaw_rate_mean_hz", s.yaw_rate_mean_hz},
+          {"duty_max", s.duty_max},
+          {"saturated_fraction", s.saturated_fraction},
+          {"ticks", s.ticks},
+          {"real_time_factor", s.real_time_factor},
+          {"interrupted", s.interrupted},
+          {"log", a.log},
+          {"estimators", estimators},
+          {"config_sha256", config_sha256},
+          {"version", EQUIPOISE_VERSION}};
+}
+
+void print_summary(std::FILE* out, const Arguments& a, const SimSummary& s) {
+  const double seconds = static_cast<double>(s.ticks) * kTickS;
+  if (s.fell) {
+    std::fprintf(out, "FELL after %.2f s", s.fell_at_s);
+  } else {
+    std::fprintf(out, "%s after %.1f s", s.interrupted ? "Interrupted, upright" : "Upright", seconds);
+  }
+  std::fprintf(out, "  (%s, %s, %s, seed %llu)\n", a.estimator.c_str(), a.controller.c_str(),
+               a.fidelity.c_str(), static_cast<unsigned long long>(a.options.seed));
+  std::fprintf(out, "  yaw rate        %8.3f Hz\n", s.yaw_rate_mean_hz);
+  std::fprintf(out, "  attitude RMSE   %8.4f rad\n", s.controlling.attitude_rmse_rad);
+  std::fprintf(out, "  ball speed RMSE %8.2f cm/s\n", 100.0 * s.controlling.ball_speed_rmse_m_s);
+  std::fprintf(out, "  position RMSE   %8.3f m\n", s.position_rmse_m);
+  std::fprintf(out, "  duty max        %8.3f, saturated %.2f %% of the time\n", s.duty_max,
+               100.0 * s.saturated_fraction);
+  std::fprintf(out, "  simulated at    %8.0f x real time\n", s.real_time_factor);
+  if (s.estimators.size() > 1) {
+    std::fprintf(out, "  %-18s %14s %18s\n", "estimator", "attitude, rad", "ball speed, cm/s");
+    for (const auto& [name, e] : s.estimators) {
+      std::fprintf(out, "  %-18s %14.4f %18.2f\n", name.c_str(), e.attitude_rmse_rad,
+                   100.0 * e.ball_speed_rmse_m_s);
+    }
+  }
+}
+
+/// Wall-clock pacing and a progress line, on the simulation's own thread.
+class Pace {
+ public:
+  Pace(bool realtime, double duration_s, std::FILE* out)
+      : realtime_(realtime), duration_s_(duration_s), out_(isatty(fileno(out)) != 0 ? out : nullptr) {}
+
+  void tick(const runtime::TickRecord& r) {
+    const double t = static_cast<double>(r.now_ns) * 1e-9;
+    if (realtime_)
+      std::this_thread::sleep_until(
+          start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(t)));
+    if (out_ == nullptr || t < next_line_s_) return;
+    next_line_s_ = t + duration_s_ / 100.0;
+    std::fprintf(out_, "\r%6.1f / %.1f s  tilt %+.3f %+.3f rad  yaw %+6.2f rad/s  ", t, duration_s_,
+                 r.estimate.theta_rad[0], r.estimate.theta_rad[1], r.estimate.omega_B_rad_s[2]);
+    std::fflush(out_);
+  }
+  void end() {
+    if (out_ != nullptr) std::fprintf(out_, "\r%70s\r", "");
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  bool realtime_;
+  double duration_s_;
+  std::FILE* out_;
+  Clock::time_point start_ = Clock::now();
+  double next_line_s_ = 0.0;
+};
+
+std::string default_log(const Arguments& a) {
+  std::filesystem::create_directories("logs");
+  return "logs/sim-" + a.estimator + "-" + a.fidelity + "-seed" + std::to_string(a.options.seed) + ".lcm";
+}
+
+int run(Arguments a) {
+  if (robot_type(a.config) != "mbbr") {
+    throw ConfigError(a.config + ": robot.type: \"" + robot_type(a.config) +
+                      "\" cannot be simulated by this build");
+  }
+  LoadedMbbr loaded = load_mbbr(a.config, a.set);
+  for (std::size_t i = 0; i < kMbbrEstimatorNames.size(); ++i) {
+    if (a.estimator == kMbbrEstimatorNames[i])
+      loaded.config.estimators.active = static_cast<MbbrEstimatorId>(i);
+  }
+  for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
+    if (a.fidelity == kFidelityNames[i]) a.options.fidelity = static_cast<Fidelity>(i);
+  }
+  if (a.log.empty()) a.log = default_log(a);
+
+  runtime::TelemetryOptions telemetry_options;
+  telemetry_options.log_path = a.log;
+  telemetry_options.url = a.telemetry == "off" ? "" : a.telemetry;
+  telemetry_options.wait_when_full = !a.realtime;
+  if (a.realtime) telemetry_options.max_publish_hz = 2.0 * kTickHz;
+  telemetry_options.estimators.assign(kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end());
+  telemetry_options.run = {"mbbr",
+                           a.estimator,
+                           a.controller,
+                           a.fidelity,
+                           static_cast<std::int64_t>(a.options.seed),
+                           loaded.config.robot.r,
+                           EQUIPOISE_VERSION,
+                           loaded.sha256,
+                           loaded.toml};
+  runtime::Telemetry telemetry(telemetry_options);
+
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  std::FILE* const out = a.json == "-" ? stderr : stdout;
+  Pace pace(a.realtime, a.options.duration_s, stderr);
+  const SimSummary summary = simulate_mbbr(
+      loaded.config, a.options,
+      [&](const runtime::TickRecord& record) {
+        telemetry.hand_over(record);
+        if (telemetry.log_failed()) interrupted.store(true);  // nothing flies unrecorded
+        pace.tick(record);
+      },
+      interrupted);
+  pace.end();
+  const runtime::TelemetryReport report = telemetry.finish();
+  if (!report.warning.empty()) std::fprintf(stderr, "equipoise: warning: %s\n", report.warning.c_str());
+
+  print_summary(out, a, summary);
+  std::fprintf(out, "  log             %s\n", a.log.c_str());
+  if (!a.json.empty()) write_json(to_json(a, summary, loaded.sha256), a.json);
+  if (!report.log_error.empty()) {
+    std::fprintf(stderr, "equipoise: %s\n", report.log_error.c_str());
+    return 1;
+  }
+  return summary.fell ? 1 : 0;
+}
+
+}  // namespace
+
+void add_sim(CLI::App& app, int* status) {
+  auto* command = app.add_subcommand("sim", "Simulates the robot through the production pipeline");
+  auto a = std::make_shared<Arguments>();
+  command->add_option("--config", a->config, "robot configuration, TOML")->required();
+  command->add_option("--yaw-hz", a->options.yaw_hz, "yaw rate, turns per second")
+      ->check(CLI::Range(-5.0, 5.0));
+  command->add_option("--drive-mps", a->options.drive_mps, "drive speed, m/s")->check(CLI::Range(-2.0, 2.0));
+  command->add_option("--duration-s", a->options.duration_s, "simulated time, s")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 360000.0));
+  command->add_option("--seed", a->options.seed, "seed of every random number")->capture_default_str();
+  command->add_option("--estimator", a->estimator, "ekf, ekf13_published, ekf13, kf_attitude, truth")
+      ->capture_default_str()
+      ->check(
+          CLI::IsMember(std::vector<std::string>(kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end())));
+  command->add_option("--controller", a->controller, "thesis")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"thesis"}));
+  command->add_option("--fidelity", a->fidelity, "ideal, thesis, full")
+      ->capture_default_str()
+      ->check(CLI::IsMember(kFidelityNames));
+  command->add_option("--attitude", a->attitude, "attitude source: dmp")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"dmp"}));
+  command->add_option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
+  command->add_flag("--compare", a->options.compare, "run every estimator on the same samples");
+  command->add_option("--log", a->log, "LCM event log (default: logs/sim-...)");
+  command->add_option("--json", a->json, "summary as JSON, - for stdout");
+  command->add_flag("--realtime", a->realtime, "pace to wall-clock time");
+  command->add_option("--telemetry", a->telemetry, "LCM provider URL, or off")->capture_default_str();
+  command->callback([=] { *status = run(*a); });
+}
+
+}  // namespace equipoise::app
