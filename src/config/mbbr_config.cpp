@@ -83,6 +83,7 @@ template <class Filter, int N, int M>
 void read_filter(Section s, Filter& params) {
   params.Q = s.vector<N>("q", 0.0, 1e6);
   params.R = s.vector<M>("r", 1e-15, 1e6);
+  params.input_variance = s.vector<3>("input_variance", 0.0, 100.0);
   params.initial_variance = s.number("initial_variance", 0.0, 1e3);
   s.finish();
 }

@@ -40,6 +40,19 @@ void MbbrHighYaw::accelerations(const MbbrCoefficients& c, const State& x, const
   J(4, kPhiDotX) -= x(kThetaDotZ);
 }
 
+Mat<5, 3> MbbrHighYaw::rate_input_matrix(const MbbrCoefficients& c) noexcept {
+  Vec<5> free;
+  Vec<5> driven;
+  Mat<5, 7> J;
+  accelerations(c, State::Zero(), Vec3::Zero(), free, J);
+  Mat<5, 3> B;
+  for (int k = 0; k < 3; ++k) {
+    accelerations(c, State::Zero(), Vec3::Unit(k), driven, J);
+    B.col(k) = kTickS * (driven - free);
+  }
+  return B;
+}
+
 void MbbrHighYaw::inertial_rows(const MbbrCoefficients& c, const State& x, const Vec3& u, Vec<5>& y,
                                 Mat<5, 7>& J) noexcept {
   J.setZero();
@@ -51,8 +64,12 @@ void MbbrHighYaw::inertial_rows(const MbbrCoefficients& c, const State& x, const
   J(1, kThetaDotY) = 1.0;
   J(1, kThetaX) = x(kThetaDotZ);
   J(1, kThetaDotZ) = x(kThetaX);
-  y(2) = x(kThetaDotZ);
+  // theta_z'' has theta_x theta_y'', and theta_y'' is not small: without its integral here the filter would read
+  // tilt out of the yaw gyro, and the ball speed error grows fivefold.
+  y(2) = x(kThetaDotZ) - x(kThetaX) * x(kThetaDotY);
   J(2, kThetaDotZ) = 1.0;
+  J(2, kThetaX) = -x(kThetaDotY);
+  J(2, kThetaDotY) = -x(kThetaX);
   double h[2];
   double rows[2][7];
   generated::mbbr::accelerometer(c, x.data(), u.data(), h, rows);
@@ -115,6 +132,12 @@ void MbbrModel10::predict(const Vec<10>& x, const Vec3& u, Vec<10>& x_next, Mat<
   F.block<5, 5>(kThetaDotX, kThetaDotX) += kTickS * J.rightCols<5>();
 }
 
+Mat<10, 3> MbbrModel10::input_matrix() const noexcept {
+  Mat<10, 3> B = Mat<10, 3>::Zero();
+  B.bottomRows<5>() = MbbrHighYaw::rate_input_matrix(c_);
+  return B;
+}
+
 void MbbrModel10::measure(const Vec<10>& x, const Vec3& u, Vec<8>& y, Mat<8, 10>& H) const noexcept {
   MbbrHighYaw::State d;
   d << x.head<2>(), x.tail<5>();
@@ -155,6 +178,12 @@ void MbbrModel13::predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_next, Mat<
   F.block<5, 5>(M::kThetaDotX, M::kThetaDotX) += kTickS * J.rightCols<5>();
   F.block<3, 2>(M::kSlipX, 0) = kTickS * E.leftCols<2>();
   F.block<3, 5>(M::kSlipX, M::kThetaDotX) = kTickS * E.rightCols<5>();
+}
+
+Mat<13, 3> MbbrModel13::input_matrix() const noexcept {
+  Mat<13, 3> B = Mat<13, 3>::Zero();
+  B.middleRows<5>(MbbrPublishedModel::kThetaDotX) = MbbrHighYaw::rate_input_matrix(c_);
+  return B;
 }
 
 void MbbrModel13::measure(const Vec<13>& x, const Vec3& u, Vec<8>& y, Mat<8, 13>& H) const noexcept {
@@ -209,14 +238,13 @@ MbbrLinearModel::MbbrLinearModel(const MbbrParameters& p) noexcept {
   H_(3, 3) = 1.0;
   H_(3, 1) = -1.0;
 
+  const Mat<5, 3> B = MbbrHighYaw::rate_input_matrix(c);
   B_.setZero();
   D_.setZero();
   for (int k = 0; k < 2; ++k) {
-    Vec<5> a;
+    for (int i = 0; i < 4; ++i) B_(4 + i, k) = B(accel_row[i], k);
     Vec<5> y;
-    MbbrHighYaw::accelerations(c, zero, Vec3::Unit(k), a, J);
     MbbrHighYaw::inertial_rows(c, zero, Vec3::Unit(k), y, G);
-    for (int i = 0; i < 4; ++i) B_(4 + i, k) = kTickS * (a - a0)(accel_row[i]);
     D_(4, k) = (y - y0)(3);
     D_(5, k) = (y - y0)(4);
   }

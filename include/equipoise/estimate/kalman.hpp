@@ -5,6 +5,7 @@
 //
 // A Model supplies kStates, kInputs, kOutputs and
 //   void predict(const Vec<n>& x, const Vec<p>& u, Vec<n>& x_next, Mat<n, n>& F) const noexcept;
+//   Mat<n, p> input_matrix() const noexcept;  // change of x_next per unit of u, near the operating point
 //   void measure(const Vec<n>& x, const Vec<p>& u, Vec<m>& y, Mat<m, n>& H) const noexcept;
 #pragma once
 
@@ -24,10 +25,15 @@ class KalmanFilter {
   struct Params {
     Vec<n> Q = Vec<n>::Constant(1e-4);  // diagonal, per tick
     Vec<m> R = Vec<m>::Ones();          // diagonal
+    Vec<p> input_variance = Vec<p>::Zero();  // of u, per tick: friction and motors that do not do as told
     double initial_variance = 1e-4;
   };
 
-  KalmanFilter(const Model& model, const Params& params) : model_(model), params_(params) {
+  KalmanFilter(const Model& model, const Params& params)
+      : model_(model),
+        params_(params),
+        Q_(model.input_matrix() * params.input_variance.asDiagonal() * model.input_matrix().transpose()) {
+    Q_.diagonal() += params.Q;
     reset(Vec<n>::Zero());
   }
 
@@ -44,7 +50,7 @@ class KalmanFilter {
     FP_.noalias() = F_ * P_;
     P_.noalias() = FP_ * F_.transpose();
     P_.template triangularView<Eigen::StrictlyUpper>() = P_.transpose();
-    P_.diagonal() += params_.Q;
+    P_ += Q_;
   }
 
   void update(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
@@ -80,6 +86,7 @@ class KalmanFilter {
  private:
   Model model_;
   Params params_;
+  Mat<n, n> Q_;
   Vec<n> x_;
   Mat<n, n> P_;
   Mat<n, n> F_ = Mat<n, n>::Identity();

@@ -22,6 +22,8 @@ struct MbbrHighYaw {
 
   static void accelerations(const MbbrCoefficients& c, const State& x, const Vec3& u, Vec<5>& a,
                             Mat<5, 7>& J) noexcept;
+  /// Change of the five rates per tick and unit of u, upright at rest.
+  static Mat<5, 3> rate_input_matrix(const MbbrCoefficients& c) noexcept;
   static void inertial_rows(const MbbrCoefficients& c, const State& x, const Vec3& u, Vec<5>& y,
                             Mat<5, 7>& J) noexcept;  // gyro x, y, z, accelerometer x, y
 };
@@ -37,6 +39,7 @@ class MbbrModel10 {
 
   explicit MbbrModel10(const MbbrParameters& p) : c_(mbbr_coefficients(p)) {}
   void predict(const Vec<10>& x, const Vec3& u, Vec<10>& x_next, Mat<10, 10>& F) const noexcept;
+  Mat<10, 3> input_matrix() const noexcept;
   void measure(const Vec<10>& x, const Vec3& u, Vec<8>& y, Mat<8, 10>& H) const noexcept;
 
  private:
@@ -52,6 +55,7 @@ class MbbrModel13 {
 
   explicit MbbrModel13(const MbbrParameters& p) : c_(mbbr_coefficients(p)) {}
   void predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_next, Mat<13, 13>& F) const noexcept;
+  Mat<13, 3> input_matrix() const noexcept;
   void measure(const Vec<13>& x, const Vec3& u, Vec<8>& y, Mat<8, 13>& H) const noexcept;
 
  private:
@@ -68,6 +72,7 @@ class MbbrLinearModel {
 
   explicit MbbrLinearModel(const MbbrParameters& p) noexcept;
   void predict(const Vec<8>& x, const Vec3& u, Vec<8>& x_next, Mat<8, 8>& F) const noexcept;
+  Mat<8, 3> input_matrix() const noexcept { return B_; }
   void measure(const Vec<8>& x, const Vec3& u, Vec<6>& y, Mat<6, 8>& H) const noexcept;
 
  private:

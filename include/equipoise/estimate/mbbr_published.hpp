@@ -28,6 +28,7 @@ struct MbbrPublishedModel {
   };
 
   void predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_next, Mat<13, 13>& F) const noexcept;
+  Mat<13, 3> input_matrix() const noexcept { return Mat<13, 3>::Zero(); }  // [T] has diagonal Q only
   void measure(const Vec<13>& x, const Vec3& u, Vec<8>& y, Mat<8, 13>& H) const noexcept;
 };
 
