@@ -207,7 +207,9 @@ LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& ov
   read_filter<KalmanFilter<MbbrModel13>::Params, 13, 8>(estimator.table("ekf13"), c.estimators.ekf13);
   read_filter<KalmanFilter<MbbrPublishedModel>::Params, 13, 8>(estimator.table("ekf13_published"),
                                                                c.estimators.ekf13_published);
-  read_filter<KalmanFilter<MbbrLinearModel>::Params, 8, 6>(estimator.table("kf_attitude"), c.estimators.kf);
+  Section kf = estimator.table("kf_attitude");
+  c.estimators.kf_yaw_transport = kf.boolean("yaw_transport");
+  read_filter<KalmanFilter<MbbrLinearModel>::Params, 8, 6>(kf, c.estimators.kf);
   estimator.finish();
   c.estimators.robot = c.robot;
 

@@ -20,7 +20,7 @@ MbbrEstimators::MbbrEstimators(const Params& params)
       ekf_(MbbrModel10(params.robot), params.ekf),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
-      kf_(MbbrLinearModel(params.robot), params.kf) {}
+      kf_(MbbrLinearModel(params.robot, params.kf_yaw_transport), params.kf) {}
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);
@@ -105,7 +105,7 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
           Id::kKfAttitude)) {  // [T] section 6.4.6: attitude from its source, the rest from the linear filter
     Vec<6> y6;
     y6 << z.gyro_B_rad_s.head<2>(), phi_B.head<2>(), z.accel_B_m_s2.head<2>();
-    step(kf_, u, y6, std::array<bool, 6>{i, i, e, e, i, i});
+    step(kf_, Vec3(u.x(), u.y(), z.gyro_B_rad_s.z()), y6, std::array<bool, 6>{i, i, e, e, i, i});
     const Vec<8>& x = kf_.x();
     MbbrEstimate& out = estimates_[index(Id::kKfAttitude)];
     if (z.attitude_ok) {

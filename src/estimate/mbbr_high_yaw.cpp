@@ -64,8 +64,8 @@ void MbbrHighYaw::inertial_rows(const MbbrCoefficients& c, const State& x, const
   J(1, kThetaDotY) = 1.0;
   J(1, kThetaX) = x(kThetaDotZ);
   J(1, kThetaDotZ) = x(kThetaX);
-  // theta_z'' has theta_x theta_y'', and theta_y'' is not small: without its integral here the filter would read
-  // tilt out of the yaw gyro, and the ball speed error grows fivefold.
+  // theta_z'' has theta_x theta_y'', and theta_y'' is not small: without its integral here the filter would
+  // read tilt out of the yaw gyro, and the ball speed error grows fivefold.
   y(2) = x(kThetaDotZ) - x(kThetaX) * x(kThetaDotY);
   J(2, kThetaDotZ) = 1.0;
   J(2, kThetaX) = -x(kThetaDotY);
@@ -208,7 +208,8 @@ void MbbrModel13::measure(const Vec<13>& x, const Vec3& u, Vec<8>& y, Mat<8, 13>
   H.block<2, 5>(6, M::kThetaDotX) = J.bottomRightCorner<2, 5>();
 }
 
-MbbrLinearModel::MbbrLinearModel(const MbbrParameters& p) noexcept {
+MbbrLinearModel::MbbrLinearModel(const MbbrParameters& p, bool yaw_transport) noexcept
+    : yaw_transport_(yaw_transport) {
   const MbbrCoefficients c = mbbr_coefficients(p);
   const MbbrHighYaw::State zero = MbbrHighYaw::State::Zero();
   Vec<5> a0;
@@ -253,7 +254,16 @@ MbbrLinearModel::MbbrLinearModel(const MbbrParameters& p) noexcept {
 
 void MbbrLinearModel::predict(const Vec<8>& x, const Vec3& u, Vec<8>& x_next, Mat<8, 8>& F) const noexcept {
   F = F_;
-  x_next.noalias() = F_ * x;
+  if (yaw_transport_) {
+    const double turn = kTickS * u.z();
+    F(0, 1) += turn;  // theta' = body rate + theta_z' (theta_y, -theta_x)
+    F(1, 0) -= turn;
+    F(2, 1) += turn;  // (5.31)
+    F(3, 0) -= turn;
+    F(6, 7) += turn;
+    F(7, 6) -= turn;
+  }
+  x_next.noalias() = F * x;
   x_next.noalias() += B_ * u;
 }
 

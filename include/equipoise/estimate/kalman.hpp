@@ -23,8 +23,8 @@ class KalmanFilter {
   static constexpr int p = Model::kInputs;
 
   struct Params {
-    Vec<n> Q = Vec<n>::Constant(1e-4);  // diagonal, per tick
-    Vec<m> R = Vec<m>::Ones();          // diagonal
+    Vec<n> Q = Vec<n>::Constant(1e-4);       // diagonal, per tick
+    Vec<m> R = Vec<m>::Ones();               // diagonal
     Vec<p> input_variance = Vec<p>::Zero();  // of u, per tick: friction and motors that do not do as told
     double initial_variance = 1e-4;
   };

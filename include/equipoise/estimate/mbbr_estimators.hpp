@@ -26,6 +26,7 @@ struct MbbrEstimatorParams {
   KalmanFilter<MbbrPublishedModel>::Params ekf13_published;
   KalmanFilter<MbbrModel13>::Params ekf13;
   KalmanFilter<MbbrLinearModel>::Params kf;
+  bool kf_yaw_transport = true;  // false: as in [T]
   MbbrParameters robot;
 };
 

@@ -63,23 +63,25 @@ class MbbrModel13 {
 };
 
 /// Linear model: the same at zero yaw rate, two decoupled pendulums, [T] (5.27)-(5.29) with derived
-/// coefficients.
+/// coefficients. With `yaw_transport` the third input is the measured yaw rate, and tilt, encoder sum and
+/// ball rates turn with the frame they are resolved in; without it, as in [T], they lag by the spin.
 class MbbrLinearModel {
  public:
-  static constexpr int kStates = 8;   // theta_x, theta_y, phi_x*, phi_y*, and their rates
-  static constexpr int kInputs = 3;   // u_z unused
+  static constexpr int kStates = 8;  // theta_x, theta_y, encoder sums x, y, body rates x, y, phi_x*', phi_y*'
+  static constexpr int kInputs = 3;  // u_x, u_y, yaw rate
   static constexpr int kOutputs = 6;  // gyro x, y, encoder x, y, accelerometer x, y
 
-  explicit MbbrLinearModel(const MbbrParameters& p) noexcept;
+  MbbrLinearModel(const MbbrParameters& p, bool yaw_transport) noexcept;
   void predict(const Vec<8>& x, const Vec3& u, Vec<8>& x_next, Mat<8, 8>& F) const noexcept;
   Mat<8, 3> input_matrix() const noexcept { return B_; }
   void measure(const Vec<8>& x, const Vec3& u, Vec<6>& y, Mat<6, 8>& H) const noexcept;
 
  private:
   Mat<8, 8> F_;
-  Mat<8, 3> B_;
+  Mat<8, 3> B_;  // third column zero
   Mat<6, 8> H_;
   Mat<6, 3> D_;
+  bool yaw_transport_;
 };
 
 }  // namespace equipoise
