@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "equipoise/control/mbbr_reference.hpp"
+#include "equipoise/control/mbbr_scheduled_feedback.hpp"
 #include "equipoise/control/mbbr_thesis_feedback.hpp"
 #include "equipoise/estimate/mbbr_estimators.hpp"
 #include "equipoise/pipeline.hpp"
@@ -23,6 +24,7 @@ struct ConfigError : std::runtime_error {
 inline const std::vector<std::string> kFidelityNames{"ideal", "thesis", "full"};
 
 using MbbrThesisPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrThesisFeedback>;
+using MbbrScheduledPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrScheduledFeedback>;
 
 struct MbbrConfig {
   MbbrParameters robot;
@@ -32,11 +34,13 @@ struct MbbrConfig {
   MbbrEstimatorParams estimators;
   MbbrReferenceParams reference;
   MbbrThesisFeedbackParams thesis;
+  MbbrScheduledFeedbackParams scheduled;
   SafetyParams safety;
   std::array<WorldParams, 3> world;          // by Fidelity
   std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
 
   MbbrThesisPipeline::Params thesis_pipeline() const;
+  MbbrScheduledPipeline::Params scheduled_pipeline() const;
 };
 
 /// Name of the robot a file is for, without reading the rest.

@@ -19,7 +19,7 @@ struct Arguments {
   std::string config;
   SimOptions options;
   std::string estimator = "ekf";
-  std::string controller = "thesis";
+  std::string controller = "scheduled";
   std::string fidelity = "full";
   std::string attitude = "dmp";
   std::vector<std::string> set;
@@ -131,6 +131,7 @@ int run(Arguments a) {
     if (a.estimator == kMbbrEstimatorNames[i])
       loaded.config.estimators.active = static_cast<MbbrEstimatorId>(i);
   }
+  a.options.controller = a.controller == "thesis" ? MbbrController::kThesis : MbbrController::kScheduled;
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
     if (a.fidelity == kFidelityNames[i]) a.options.fidelity = static_cast<Fidelity>(i);
   }
@@ -196,9 +197,9 @@ void add_sim(CLI::App& app, int* status) {
       ->capture_default_str()
       ->check(
           CLI::IsMember(std::vector<std::string>(kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end())));
-  command->add_option("--controller", a->controller, "thesis")
+  command->add_option("--controller", a->controller, "thesis, scheduled")
       ->capture_default_str()
-      ->check(CLI::IsMember({"thesis"}));
+      ->check(CLI::IsMember(kMbbrControllerNames));
   command->add_option("--fidelity", a->fidelity, "ideal, thesis, full")
       ->capture_default_str()
       ->check(CLI::IsMember(kFidelityNames));

@@ -51,25 +51,14 @@ Command script(const SimOptions& o, double t) {
   return c;
 }
 
-}  // namespace
-
-SimSummary simulate_mbbr(const MbbrConfig& configured, const SimOptions& options, const TickObserver& observe,
-                         const std::atomic<bool>& stop) {
-  const auto level = static_cast<std::size_t>(options.fidelity);
-  MbbrConfig config = configured;
-  WorldParams world_params = config.world[level];
-  world_params.seed = options.seed;
-  // The firmware is configured for the robot it is on: the level's bridge, and no compensation of absent
-  // friction.
-  config.motor.bridge = config.world_bridge[level];
-  if (!world_params.friction) config.friction.gain = 0.0;
-  config.estimators.compare = options.compare;
-  config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
-
+template <class Pipeline>
+SimSummary fly(const MbbrConfig& config, const WorldParams& world_params,
+               const typename Pipeline::Params& pipeline_params, const SimOptions& options,
+               const TickObserver& observe, const std::atomic<bool>& stop) {
   MbbrWorld world(config.robot, config.motor, config.calibration, world_params);
   PlantBackend<MbbrWorld> backend(world);
   Hardware hardware(backend.io());
-  MbbrThesisPipeline pipeline(config.thesis_pipeline());
+  Pipeline pipeline(pipeline_params);
   MbbrEstimators& estimators = pipeline.estimators();
 
   SimSummary summary;
@@ -92,7 +81,7 @@ SimSummary simulate_mbbr(const MbbrConfig& configured, const SimOptions& options
     return script(options, world.time_s());
   };
   const auto on_tick = [&](std::int64_t tick, std::int64_t now_ns, const RawSample& raw,
-                           const Command& command, const MbbrThesisPipeline::Result& t) {
+                           const Command& command, const typename Pipeline::Result& t) {
     const MbbrEstimate truth = world.truth();
     const double time_s = world.time_s();
     if (t.motors.enable) {
@@ -174,6 +163,25 @@ SimSummary simulate_mbbr(const MbbrConfig& configured, const SimOptions& options
     }
   }
   return summary;
+}
+
+}  // namespace
+
+SimSummary simulate_mbbr(const MbbrConfig& configured, const SimOptions& options, const TickObserver& observe,
+                         const std::atomic<bool>& stop) {
+  const auto level = static_cast<std::size_t>(options.fidelity);
+  MbbrConfig config = configured;
+  WorldParams world = config.world[level];
+  world.seed = options.seed;
+  // The firmware is configured for the robot it is on: the level's bridge, and no compensation of absent
+  // friction.
+  config.motor.bridge = config.world_bridge[level];
+  if (!world.friction) config.friction.gain = 0.0;
+  config.estimators.compare = options.compare;
+  config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
+  return options.controller == MbbrController::kThesis
+             ? fly<MbbrThesisPipeline>(config, world, config.thesis_pipeline(), options, observe, stop)
+             : fly<MbbrScheduledPipeline>(config, world, config.scheduled_pipeline(), options, observe, stop);
 }
 
 }  // namespace equipoise::app

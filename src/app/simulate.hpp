@@ -12,7 +12,11 @@
 
 namespace equipoise::app {
 
+enum class MbbrController { kThesis, kScheduled };
+inline const std::vector<std::string> kMbbrControllerNames{"thesis", "scheduled"};
+
 struct SimOptions {
+  MbbrController controller = MbbrController::kScheduled;
   double yaw_hz = 0.0;
   double drive_mps = 0.0;
   double duration_s = 30.0;

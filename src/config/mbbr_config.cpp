@@ -216,6 +216,9 @@ LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& ov
   c.reference = read_reference(root.table("reference"), c.robot.r);
   Section controller = root.table("controller");
   c.thesis = read_thesis(controller.table("thesis"));
+  Section scheduled = controller.table("scheduled");
+  c.scheduled.yaw_feedforward = scheduled.boolean("yaw_feedforward");
+  scheduled.finish();
   controller.finish();
   c.safety = read_safety(root.table("safety"));
 
@@ -232,6 +235,10 @@ LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& ov
 
 MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {
   return {robot, calibration, estimators, reference, thesis, friction, motor, safety};
+}
+
+MbbrScheduledPipeline::Params MbbrConfig::scheduled_pipeline() const {
+  return {robot, calibration, estimators, reference, scheduled, friction, motor, safety};
 }
 
 }  // namespace equipoise

@@ -39,6 +39,7 @@ MbbrReference MbbrReferenceStage::update(const Command& command, const MbbrEstim
 
   // (6.11)
   const Vec2 velocity_target = rotate(heading_zero_, command.velocity_W_m_s);
+  const Vec2 velocity_before = velocity_W_;
   velocity_W_ = slew(velocity_W_, velocity_target, p_.max_acceleration_m_s2 * kTickS);
   const double yaw_step = p_.max_yaw_acceleration_rad_s2 * kTickS;
   yaw_rate_ += std::clamp(command.yaw_rate_rad_s - yaw_rate_, -yaw_step, yaw_step);
@@ -56,6 +57,7 @@ MbbrReference MbbrReferenceStage::update(const Command& command, const MbbrEstim
   ref.yaw_rate = yaw_rate_;
   ref.d_phi = rotate(to_yaw, phi_ref_ - x_hat.phi);  // (6.8)
   ref.phi_dot_star = rotate(to_yaw, phi_dot_ref);
+  ref.phi_ddot_star = rotate(to_yaw, ball_rate(p_.ball_radius_m, velocity_W_ - velocity_before) / kTickS);
   ref.d_phi_dot_unfiltered = ref.phi_dot_star - x_hat.phi_dot_star;  // (6.9)
   const Vec2 rate_error =
       inertial ? rotate(x_hat.theta_z, ref.d_phi_dot_unfiltered) : ref.d_phi_dot_unfiltered;

@@ -28,10 +28,11 @@ struct MbbrReferenceParams {
 };
 
 struct MbbrReference {
-  Vec2 theta_xy = Vec2::Zero();      // lean, yaw frame
-  Vec2 rate_xy = Vec2::Zero();       // its rate: body rates or Euler rates, as configured
-  Vec2 phi = Vec2::Zero();           // inertial
-  Vec2 phi_dot_star = Vec2::Zero();  // yaw frame
+  Vec2 theta_xy = Vec2::Zero();       // lean, yaw frame
+  Vec2 rate_xy = Vec2::Zero();        // its rate: body rates or Euler rates, as configured
+  Vec2 phi = Vec2::Zero();            // inertial
+  Vec2 phi_ddot_star = Vec2::Zero();  // inertial acceleration, resolved in the yaw frame
+  Vec2 phi_dot_star = Vec2::Zero();   // yaw frame
   double theta_z = 0.0;
   double yaw_rate = 0.0;
   // Errors, reference minus estimate, yaw frame, [T] (6.6)-(6.9)
