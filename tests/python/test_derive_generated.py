@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 import sympy as sp
-from derive import generate, mbbr, mbbr_header
+from derive import emit, generate, mbbr, mbbr_gains, mbbr_header, mip, mip_header
 
 
 def test_committed_headers_are_current(root):
@@ -28,23 +28,18 @@ def test_last_digits_of_another_solver_are_not_stale():
     assert not generate.same("x = 1.5;", "y = 1.5;")
 
 
-MBBR_PROGRAM = r"""
+PROGRAM = r"""
 #include <cstdio>
-#include "generated/mbbr_gains.hpp"
-#include "generated/mbbr_model.hpp"
-using namespace equipoise::generated::mbbr;
-static_assert(kScheduled.size() == kRows && kScheduled[0].yaw_rate_rad_s == 0.0);
+#include "generated/NAME_model.hpp"
+using namespace equipoise::generated::NAME;
+template <class T, std::size_t M, std::size_t N> void print(const T (&v)[M], const T (&J)[M][N]) {
+  for (T e : v) std::printf("%.17g ", double(e));
+  for (auto& row : J) for (T e : row) std::printf("%.17g ", double(e));
+}
 template <class T> void run() {
-  const Parameters p{PARAMETERS};
-  const Coefficients<T> c = coefficients<T>(p);
-  const T x[7] = {STATE}, u[3] = {INPUT};
-  T a[5], J[5][7], y[2], H[2][7];
-  accelerations(c, x, u, a, J);
-  accelerometer(c, x, u, y, H);
-  for (T v : a) std::printf("%.17g ", double(v));
-  for (auto& row : J) for (T v : row) std::printf("%.17g ", double(v));
-  for (T v : y) std::printf("%.17g ", double(v));
-  for (auto& row : H) for (T v : row) std::printf("%.17g ", double(v));
+  const Coefficients<T> c = coefficients<T>(Parameters{PARAMETERS});
+  const T x[] = {STATE}, u[] = {INPUT};
+  CALLS
   std::printf("\n");
 }
 int main() { run<double>(); run<float>(); }
@@ -72,23 +67,57 @@ def compile_and_run(root, folder, program):
     return [np.array(line.split(), float) for line in lines]
 
 
-def test_mbbr_header_computes_the_derived_rows_and_their_jacobians(root, tmp_path):
-    parameters = mbbr.TABLE_5_2 | {"I_t2": 2.6e-3, "l_az": 0.17}  # no accidental symmetry
-    state, u = [0.03, -0.05, 0.4, -0.7, 6.0, 3.0, -5.0], [0.6, -0.3, 1.2]
-    program = MBBR_PROGRAM.replace("PARAMETERS", ", ".join(map(repr, parameters.values())))
-    program = program.replace("STATE", ", ".join(f"T({v})" for v in state))
-    program = program.replace("INPUT", ", ".join(f"T({v})" for v in u))
-    in_double, in_float = compile_and_run(root, tmp_path, program)
-
-    accelerations, accelerometer = mbbr.high_yaw()
-    lumped = {sp.Symbol(k, positive=True): e for k, e in mbbr.LUMPED.items()}
-    expected = []
-    for rows in (accelerations, accelerometer):
-        rows = sp.Matrix([e.subs(lumped) for e in rows])
-        f = sp.lambdify((mbbr.STATE, mbbr.INPUT, tuple(mbbr.P.values())), (rows, rows.jacobian(mbbr.STATE)))
-        value, jacobian = f(state, u, list(parameters.values()))
+def check_functions(root, folder, robot, model, parameters, state, u):
+    """Every generated function, in double and float, against the symbols and their derivatives."""
+    known = {sp.Symbol(k, positive=True): v for k, v in parameters.items()}
+    lumped = {sp.Symbol(k, positive=True): e for k, e in robot.LUMPED.items()}
+    calls, expected = "", []
+    for n, rows in enumerate(model.rows):
+        outputs, states = len(rows.names), rows.state or model.state
+        calls += f"T v{n}[{outputs}], J{n}[{outputs}][{len(states)}];\n"
+        calls += f"  {rows.function}(c, x, u, v{n}, J{n}); print(v{n}, J{n});\n  "
+        matrix = sp.Matrix([e.subs(lumped).subs(known) for e in rows.expressions])
+        f = sp.lambdify((model.state, model.inputs), (matrix, matrix.jacobian(states)))
+        value, jacobian = f(state, u)
         expected += [*np.ravel(value), *np.ravel(jacobian)]
+    program = PROGRAM.replace("PARAMETERS", ", ".join(map(repr, parameters.values())))
+    program = program.replace("STATE", ", ".join(f"T({v})" for v in state)).replace("CALLS", calls)
+    program = program.replace("INPUT", ", ".join(f"T({v})" for v in u))
+    program = program.replace("NAME", robot.__name__.rpartition(".")[2])
+    in_double, in_float = compile_and_run(root, folder, program)
     expected = np.array(expected)
     scale = np.maximum(np.abs(expected), 1.0)
     assert np.max(np.abs(in_double - expected) / scale) < 1e-12
     assert np.max(np.abs(in_float - expected) / scale) < 1e-4
+
+
+def test_mbbr_model_computes_the_derived_rows_and_their_jacobians(root, tmp_path):
+    parameters = mbbr.TABLE_5_2 | {"I_t2": 2.6e-3, "l_az": 0.17}  # no accidental symmetry
+    state, u = [0.03, -0.05, 0.4, -0.7, 6.0, 3.0, -5.0], [0.6, -0.3, 1.2]
+    check_functions(root, tmp_path, mbbr, mbbr_header.model(), parameters, state, u)
+
+
+def test_mip_model_computes_the_derived_rows_and_their_jacobians(root, tmp_path):
+    parameters = mip.TABLE_3_2 | {"lateral": 0.8, "l_ay": 0.01, "l_az": 0.03}
+    check_functions(root, tmp_path, mip, mip_header.model(), parameters, [0.03, 0.4, 6.0, 8.0], [0.6, -0.3])
+
+
+def test_mbbr_gains_compile(root, tmp_path):
+    program = """
+#include <cstdio>
+#include "generated/mbbr_gains.hpp"
+using namespace equipoise::generated::mbbr;
+static_assert(kScheduled.size() == kRows && kScheduled[0].yaw_rate_rad_s == 0.0);
+int main() { for (const Row& row : kScheduled) std::printf("%.17g %.17g\\n", row.theta.re, row.theta.im); }
+"""
+    printed = compile_and_run(root, tmp_path, program)
+    designed = [[row.gains[0].real, row.gains[0].imag] for row in mbbr_gains.design().rows]
+    assert np.array(printed) == pytest.approx(np.array(designed), rel=1e-7, abs=1e-9)
+
+
+def test_words_do_not_make_a_header_stale():
+    code = '"""About."""\n\n\ndef f(x):\n    """What it does."""\n    # why\n    return x + 1\n'
+    reworded = '"""Other words."""\n\n\ndef f(x):\n    """Something\n\n    longer."""\n    return x + 1\n'
+    changed = code.replace("x + 1", "x + 2")
+    assert emit._statements(code) == emit._statements(reworded)
+    assert emit._statements(code) != emit._statements(changed)

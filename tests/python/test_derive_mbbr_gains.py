@@ -120,6 +120,7 @@ def test_margins_agree_with_brute_force():
 COULOMB = 0.05265  # [T] section 5.3
 
 
+@pytest.mark.slow
 def test_exact_robot_holds_while_spinning_and_driving():
     """10 s at 30 cm/s: true states alone, then friction 70 % compensated and a tick late."""
     rates = (0.0, 1.0, 2.0, 3.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import textwrap
 from pathlib import Path
@@ -39,12 +40,12 @@ class _Printer(C99CodePrinter):
         return f"{above} / {self._print(bottom) if bottom.is_Symbol else f'({self._print(bottom)})'}"
 
     def _print_Mul(self, expr):
-        if expr.could_extract_minus_sign() and not expr.has(sp.Add):
-            return "-" + self._print(-expr)
-        if expr.args[0] == -1:
-            return "-" + self.parenthesize(
-                -expr, precedence(expr) - 1 if (-expr).is_Mul else precedence(expr)
-            )
+        expr = sp.Mul(*expr.args)  # factoring leaves unevaluated products
+        if not expr.is_Mul:
+            return self._print(expr)
+        if expr.as_coeff_Mul()[0].is_negative:
+            rest = -expr
+            return "-" + (self._print(rest) if rest.is_Mul else self.parenthesize(rest, precedence(expr)))
         top, bottom = expr.as_numer_denom()
         if bottom != 1:
             return self._quotient(top, bottom)
@@ -83,11 +84,22 @@ def unpack(symbols, array: str, used) -> list[str]:
     return [f"  const T {s} = {array}[{i}];" for i, s in enumerate(symbols) if s in used]
 
 
+def _statements(text: str) -> str:
+    """Python without docstrings, comment lines and layout: what it computes, not what it says."""
+    lines = text.splitlines()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node):
+            first = node.body[0]
+            lines[first.lineno - 1 : first.end_lineno] = [""] * (first.end_lineno - first.lineno + 1)
+    return "".join("".join(line.split()) for line in lines if not line.lstrip().startswith("#"))
+
+
 def input_hash(*names: str, extra: str = "") -> str:
     """Identifies what a generated file was made from."""
     digest = hashlib.sha256(extra.encode())
     for name in names:
-        digest.update((HERE / name).read_bytes())
+        text = (HERE / name).read_text(encoding="utf-8")
+        digest.update((_statements(text) if name.endswith(".py") else text).encode())
     return digest.hexdigest()[:16]
 
 

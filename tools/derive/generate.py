@@ -12,11 +12,12 @@ import re
 import sys
 from pathlib import Path
 
-from . import mbbr_gains, mbbr_header
+from . import mbbr_gains, mbbr_header, mip_header
 
 TARGETS = {
     "mbbr_model.hpp": mbbr_header.render,
     "mbbr_gains.hpp": mbbr_gains.render,
+    "mip_model.hpp": mip_header.render,
 }
 REPORTS = [mbbr_gains.report]
 DEFAULT_FOLDER = Path(__file__).resolve().parents[2] / "config" / "generated"

@@ -18,6 +18,9 @@ class Rows:
     names: list[str]  # of the rows, used in the coefficients' names
     expressions: list
     comment: str
+    # A restriction of earlier rows to fewer states and inputs: uses their coefficients.
+    state: tuple | None = None
+    inputs: tuple | None = None
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class Model:
         return [
             (f"{name}_{label}", value)
             for rows in self.rows
+            if rows.state is None
             for name, e in zip(rows.names, rows.expressions, strict=True)
             for label, _, value in self.terms(e)
         ]
@@ -101,27 +105,29 @@ class Model:
 
     def _function(self, rows: Rows) -> list[str]:
         """The outputs are affine in the small states, so each is its own Jacobian times them, plus a rest."""
+        state, inputs = rows.state or self.state, rows.inputs or self.inputs
         pairs, outputs = [], []
         for i, (name, e) in enumerate(zip(rows.names, rows.expressions, strict=True)):
             symbolic = sum(sp.Symbol(f"c.{name}_{label}") * monomial for label, monomial, _ in self.terms(e))
             symbolic = sp.sympify(symbolic)
-            pairs += [(f"J[{i}][{j}]", sp.diff(symbolic, v)) for j, v in enumerate(self.state)]
+            pairs += [(f"J[{i}][{j}]", sp.diff(symbolic, v)) for j, v in enumerate(state)]
             rest = symbolic.subs(dict.fromkeys(self.small, 0))
             by_jacobian = [
                 f"J[{i}][{j}] * {v}"
-                for j, v in enumerate(self.state)
+                for j, v in enumerate(state)
                 if v in self.small and sp.diff(symbolic, v) != 0
             ]
             outputs.append((f"{rows.output}[{i}]", rest, by_jacobian))
         rests = [(f"const T rest_{i}", rest) for i, (_, rest, _) in enumerate(outputs) if rest != 0]
-        used = set().union(*[e.free_symbols for _, e in pairs + rests]) | set(self.small)
-        n, m = len(self.state), len(rows.names)
+        used = set().union(*[e.free_symbols for _, e in pairs + rests])
+        used |= {v for v in self.small if any(p.endswith(f" {v}") for _, _, by in outputs for p in by)}
+        n, m = len(state), len(rows.names)
         head = f"inline void {rows.function}(const Coefficients<T>& c, const T x[{n}], "
-        head += f"const T u[{len(self.inputs)}],"
+        head += f"const T u[{len(inputs)}],"
         pad = " " * (head.index("(") + 1)
         lines = [f"/// {rows.comment}", "template <class T>", head]
         lines += [f"{pad}T {rows.output}[{m}], T J[{m}][{n}]) noexcept {{"]
-        lines += emit.unpack(self.state, "x", used) + emit.unpack(self.inputs, "u", used)
+        lines += emit.unpack(state, "x", used) + emit.unpack(inputs, "u", used)
         lines += emit.shared(pairs + rests, "k")
         for i, (target, rest, by_jacobian) in enumerate(outputs):
             terms = by_jacobian + ([f"rest_{i}"] if rest != 0 else [])
