@@ -48,7 +48,7 @@ int dmp_parse(const uint8_t* bytes, size_t length, dmp_packet_t* out) {
   dmp_packet_t packet = {.has_raw = length == DMP_PACKET_RAW_BYTES};
   int64_t norm_q28 = 0;
   double norm = 0.0;
-  for (int i = 0; i < 4; ++i) {
+  for (size_t i = 0; i < 4; ++i) {
     const int32_t q30 = big_endian_32(bytes + 4 * i);
     const int64_t q14 = q30 >> 16;
     norm_q28 += q14 * q14;
@@ -57,7 +57,7 @@ int dmp_parse(const uint8_t* bytes, size_t length, dmp_packet_t* out) {
   }
   if (norm_q28 < (1 << 28) - (1 << 16) || norm_q28 > (1 << 28) + (1 << 16)) return -EBADMSG;
   for (int i = 0; i < 4; ++i) packet.attitude_wxyz[i] /= sqrt(norm);
-  for (int i = 0; packet.has_raw && i < 3; ++i) {
+  for (size_t i = 0; packet.has_raw && i < 3; ++i) {
     packet.accel[i] = big_endian_16(bytes + 16 + 2 * i);
     packet.gyro[i] = big_endian_16(bytes + 22 + 2 * i);
   }
@@ -76,7 +76,7 @@ int dmp_read_firmware(const char* path, uint8_t out[DMP_FIRMWARE_BYTES]) {
     if (n == 0) status = -ENODATA;
     if (n > 0) have += (size_t)n;
   }
-  uint8_t one_more;
+  uint8_t one_more = 0;
   if (status == 0 && read(fd, &one_more, 1) != 0) status = -EFBIG;
   close(fd);
   return status;
@@ -105,9 +105,10 @@ static int load_memory(const i2c_dev_t* i2c, uint16_t address, const uint8_t* da
 }
 
 static int load_firmware(const i2c_dev_t* i2c, const uint8_t firmware[DMP_FIRMWARE_BYTES]) {
-  for (uint16_t at = 0; at < DMP_FIRMWARE_BYTES; at = (uint16_t)(at + DMP_CHUNK)) {
+  for (int at = 0; at < DMP_FIRMWARE_BYTES; at += DMP_CHUNK) {
     const int left = DMP_FIRMWARE_BYTES - at;
-    const int status = load_memory(i2c, at, firmware + at, (uint8_t)(left < DMP_CHUNK ? left : DMP_CHUNK));
+    const int status =
+        load_memory(i2c, (uint16_t)at, firmware + at, (uint8_t)(left < DMP_CHUNK ? left : DMP_CHUNK));
     if (status < 0) return status;
   }
   const uint8_t start[2] = {0x04, 0x00};
@@ -208,7 +209,7 @@ int dmp_poll(dmp_t* dmp, dmp_packet_t* out) {
     return -EOVERFLOW;
   }
   status = i2c_dev_read(dmp->i2c, MPU9250_FIFO_R_W, bytes, (uint16_t)(packets * DMP_PACKET_BYTES));
-  if (status == 0) status = accept(dmp, bytes + (packets - 1) * DMP_PACKET_BYTES, out);
+  if (status == 0) status = accept(dmp, bytes + (size_t)(packets - 1) * DMP_PACKET_BYTES, out);
   if (status < 0) begin_reset(dmp); /* half a transfer leaves the FIFO misaligned, like a bad packet */
   return status;
 }

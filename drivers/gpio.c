@@ -32,7 +32,7 @@ int gpio_find_chip(const char* chip, char path[SYSFS_PATH_MAX]) {
   DIR* dev = opendir("/dev");
   if (dev == NULL) return -errno;
   int status = -ENODEV;
-  for (const struct dirent* entry; status < 0 && (entry = readdir(dev)) != NULL;) {
+  for (const struct dirent* entry = NULL; status < 0 && (entry = readdir(dev)) != NULL;) {
     if (strncmp(entry->d_name, "gpiochip", 8) != 0) continue;
     if (sysfs_join(path, "/dev", entry->d_name) == 0 && has_label(path, chip)) status = 0;
   }

@@ -84,7 +84,7 @@ int mpu9250_read(mpu9250_t* imu, mpu9250_sample_t* out) {
   if (status < 0) return status;
   out->flags = 0;
   out->temperature = big_endian(bytes + 6);
-  for (int i = 0; i < 3; ++i) {
+  for (size_t i = 0; i < 3; ++i) {
     out->accel[i] = big_endian(bytes + 2 * i);
     out->gyro[i] = big_endian(bytes + 8 + 2 * i);
     if (at_range_end(out->accel[i]) || at_range_end(out->gyro[i])) out->flags |= MPU9250_CLIPPED;

@@ -123,7 +123,7 @@ int sysfs_find(const char* class_dir, const char* prefix, const char* device, ch
   DIR* class = opendir(class_dir);
   if (class == NULL) return errno == ENOENT ? -ENODEV : -errno;
   int status = -ENODEV;
-  for (const struct dirent* entry; status < 0 && (entry = readdir(class)) != NULL;) {
+  for (const struct dirent* entry = NULL; status < 0 && (entry = readdir(class)) != NULL;) {
     if (entry->d_name[0] == '.' || strncmp(entry->d_name, prefix, strlen(prefix)) != 0) continue;
     if (sysfs_join(out, class_dir, entry->d_name) == 0 && entry_is_device(out, device)) status = 0;
   }
