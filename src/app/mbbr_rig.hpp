@@ -1,0 +1,48 @@
+// The MBBR in its simulated world behind the hardware boundary, with the firmware configured for that world.
+// In: configuration, fidelity, seed -> out: world, backend, pipeline, ready for a loop or for single ticks.
+// Used by the fault campaign, the soak and tests. Simulation only; allocates nothing after construction.
+#pragma once
+
+#include "equipoise/config.hpp"
+#include "equipoise/plant/mbbr_world.hpp"
+#include "plant_backend.hpp"
+
+namespace equipoise::app {
+
+struct MbbrRigOptions {
+  Fidelity fidelity = Fidelity::kFull;
+  std::uint64_t seed = 1;
+  MbbrEstimatorId estimator = MbbrEstimatorId::kEkf;
+  bool compare = false;
+};
+
+/// The firmware is configured for the robot it is on: the level's bridge, no compensation of absent friction.
+inline MbbrConfig configured_for(MbbrConfig config, const MbbrRigOptions& options) {
+  const auto level = static_cast<std::size_t>(options.fidelity);
+  config.motor.bridge = config.world_bridge[level];
+  config.world[level].seed = options.seed;
+  if (!config.world[level].friction) config.friction.gain = 0.0;
+  config.estimators.active = options.estimator;
+  config.estimators.compare = options.compare;
+  config.safety.needs_attitude = options.estimator == MbbrEstimatorId::kKfAttitude;
+  return config;
+}
+
+class MbbrRig {
+ public:
+  using Pipeline = MbbrThesisPipeline;
+
+  MbbrRig(const MbbrConfig& configured, const MbbrRigOptions& options)
+      : config(configured_for(configured, options)),
+        world(config.robot, config.motor, config.calibration,
+              config.world[static_cast<std::size_t>(options.fidelity)]),
+        backend(world),
+        pipeline(config.thesis_pipeline()) {}
+
+  const MbbrConfig config;
+  MbbrWorld world;
+  PlantBackend<MbbrWorld> backend;
+  Pipeline pipeline;
+};
+
+}  // namespace equipoise::app

@@ -1,0 +1,96 @@
+// A value that is not finite, in any field the tick reads, stops the motors in that tick and leaves no trace.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <vector>
+
+#include "closed_loop.hpp"
+
+namespace equipoise {
+namespace {
+
+struct Field {
+  std::string name;
+  std::function<double&(RawSample&, Command&)> of;
+};
+
+std::vector<Field> every_field() {
+  std::vector<Field> fields;
+  const auto add = [&fields](const std::string& name, auto of) { fields.push_back({name, of}); };
+  for (std::size_t i = 0; i < 3; ++i) {
+    add("gyro_counts_" + std::to_string(i),
+        [i](RawSample& r, Command&) -> double& { return r.gyro_counts[i]; });
+    add("accel_counts_" + std::to_string(i),
+        [i](RawSample& r, Command&) -> double& { return r.accel_counts[i]; });
+  }
+  for (std::size_t i = 0; i < kMaxMotors; ++i) {
+    add("encoder_counts_" + std::to_string(i),
+        [i](RawSample& r, Command&) -> double& { return r.encoder_counts[i]; });
+    add("attitude_wxyz_" + std::to_string(i),
+        [i](RawSample& r, Command&) -> double& { return r.attitude_wxyz[i]; });
+  }
+  add("battery_counts", [](RawSample& r, Command&) -> double& { return r.battery_counts; });
+  for (int i = 0; i < 2; ++i) {
+    add("velocity_W_m_s_" + std::to_string(i),
+        [i](RawSample&, Command& c) -> double& { return c.velocity_W_m_s(i); });
+  }
+  add("yaw_rate_rad_s", [](RawSample&, Command& c) -> double& { return c.yaw_rate_rad_s; });
+  return fields;
+}
+
+bool finite(const StateView& v) {
+  return v.theta_rad.allFinite() && v.omega_B_rad_s.allFinite() && v.phi_rad.allFinite() &&
+         v.phi_dot_rad_s.allFinite();
+}
+
+class NotFinite : public ::testing::TestWithParam<Field> {};
+
+TEST_P(NotFinite, StopsTheMotorsInTheSameTickAndIsForgottenOnceFiniteAgain) {
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+                           -std::numeric_limits<double>::infinity()}) {
+    SCOPED_TRACE(bad);
+    app::MbbrRigOptions options;
+    options.compare = true;
+    ClosedLoop loop(options);
+    ASSERT_TRUE(loop.balance(1.0).motors.enable);
+
+    const ClosedLoop::Result hit = loop.tick(
+        ClosedLoop::armed(), [&](RawSample& raw, Command& command) { GetParam().of(raw, command) = bad; });
+    EXPECT_FALSE(hit.motors.enable);
+    for (const double duty : hit.motors.duty) EXPECT_EQ(duty, 0.0);
+    EXPECT_EQ(hit.arm_state, ArmState::kFault);
+    EXPECT_NE(hit.reasons & kNotFinite, 0U);
+
+    // Asking on does not help; asking again does, once six encoder samples are good.
+    EXPECT_FALSE(loop.tick(ClosedLoop::armed()).motors.enable);
+    for (int i = 0; i < 6; ++i) EXPECT_FALSE(loop.tick(Command{}).motors.enable);
+    EXPECT_TRUE(loop.tick(ClosedLoop::armed()).motors.enable);
+    const ClosedLoop::Result after = loop.run(2.0, ClosedLoop::armed());
+    EXPECT_TRUE(after.motors.enable);
+    EXPECT_LT(loop.rig.world.truth().theta_xy.norm(), 0.15);
+    for (std::size_t i = 0; i < MbbrEstimators::kCount; ++i) {
+      const auto id = static_cast<MbbrEstimatorId>(i);
+      EXPECT_TRUE(finite(view(loop.rig.pipeline.estimators().estimate(id), loop.rig.config.robot)))
+          << kMbbrEstimatorNames[i];
+    }
+  }
+}
+
+TEST_P(NotFinite, RefusesToArm) {
+  ClosedLoop loop;
+  loop.run(0.5, Command{});
+  for (int i = 0; i < 20; ++i) {
+    const ClosedLoop::Result t = loop.tick(ClosedLoop::armed(), [&](RawSample& raw, Command& command) {
+      GetParam().of(raw, command) = std::numeric_limits<double>::quiet_NaN();
+    });
+    ASSERT_FALSE(t.motors.enable);
+    ASSERT_NE(t.reasons & kNotFinite, 0U);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryField, NotFinite, ::testing::ValuesIn(every_field()),
+                         [](const auto& test) { return test.param.name; });
+
+}  // namespace
+}  // namespace equipoise
