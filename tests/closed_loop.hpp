@@ -1,5 +1,5 @@
 // The MBBR through pipeline and world, one tick at a time, so that a test can interfere with the sample or
-// the command in between.
+// the command in between. With the default controller: ClosedLoop.
 #pragma once
 
 #include <string>
@@ -12,11 +12,12 @@ inline MbbrConfig mbbr_config() {
   return load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", {}).config;
 }
 
-class ClosedLoop {
+template <class Pipeline>
+class ClosedLoopWith {
  public:
-  using Result = MbbrThesisPipeline::Result;
+  using Result = typename Pipeline::Result;
 
-  explicit ClosedLoop(const app::MbbrRigOptions& options = {}, const MbbrConfig& config = mbbr_config())
+  explicit ClosedLoopWith(const app::MbbrRigOptions& options = {}, const MbbrConfig& config = mbbr_config())
       : rig(config, options), hardware_(rig.backend.io()) {}
 
   /// `interfere(RawSample&, Command&)` runs between sensors and pipeline.
@@ -54,10 +55,12 @@ class ClosedLoop {
     return command;
   }
 
-  app::MbbrRig rig;
+  app::MbbrRigWith<Pipeline> rig;
 
  private:
   app::Hardware hardware_;
 };
+
+using ClosedLoop = ClosedLoopWith<MbbrScheduledPipeline>;
 
 }  // namespace equipoise

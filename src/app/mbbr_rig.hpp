@@ -28,21 +28,31 @@ inline MbbrConfig configured_for(MbbrConfig config, const MbbrRigOptions& option
   return config;
 }
 
-class MbbrRig {
- public:
-  using Pipeline = MbbrThesisPipeline;
+inline MbbrThesisPipeline::Params pipeline_params(const MbbrConfig& config, const MbbrThesisPipeline*) {
+  return config.thesis_pipeline();
+}
+inline MbbrScheduledPipeline::Params pipeline_params(const MbbrConfig& config, const MbbrScheduledPipeline*) {
+  return config.scheduled_pipeline();
+}
 
-  MbbrRig(const MbbrConfig& configured, const MbbrRigOptions& options)
+template <class ControllerPipeline>
+class MbbrRigWith {
+ public:
+  using Pipeline = ControllerPipeline;
+
+  MbbrRigWith(const MbbrConfig& configured, const MbbrRigOptions& options)
       : config(configured_for(configured, options)),
         world(config.robot, config.motor, config.calibration,
               config.world[static_cast<std::size_t>(options.fidelity)]),
         backend(world),
-        pipeline(config.thesis_pipeline()) {}
+        pipeline(pipeline_params(config, static_cast<const Pipeline*>(nullptr))) {}
 
   const MbbrConfig config;
   MbbrWorld world;
   PlantBackend<MbbrWorld> backend;
   Pipeline pipeline;
 };
+
+using MbbrRig = MbbrRigWith<MbbrScheduledPipeline>;  // the default controller
 
 }  // namespace equipoise::app

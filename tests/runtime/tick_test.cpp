@@ -57,19 +57,27 @@ TEST(AllocationWatchTest, SeesWhatTheTickMustNotDo) {
   EXPECT_EQ(watch.count(), 5);
 }
 
+/// Balances, spins and drives, fails, arms again.
+template <class Loop>
+void fly(Loop& loop) {
+  loop.balance(1.0);
+  loop.run(2.0, spinning());
+  loop.tick(spinning(), [](RawSample& raw, Command&) { raw.gyro_counts[0] = NAN; });
+  loop.run(0.05, Command{});
+  loop.run(0.5, ClosedLoop::armed());
+}
+
+template <class Pipeline>
+std::int64_t allocations_of(const app::MbbrRigOptions& options) {
+  ClosedLoopWith<Pipeline> loop(options);
+  const AllocationWatch watch;
+  fly(loop);
+  return watch.count();
+}
+
 TEST_P(Tick, AllocatesNothing) {
-  ClosedLoop loop(options());
-  std::int64_t allocations = 0;
-  {
-    const AllocationWatch watch;
-    loop.balance(1.0);
-    loop.run(2.0, spinning());
-    loop.tick(spinning(), [](RawSample& raw, Command&) { raw.gyro_counts[0] = NAN; });
-    loop.run(0.05, Command{});
-    loop.run(0.5, ClosedLoop::armed());
-    allocations = watch.count();
-  }
-  EXPECT_EQ(allocations, 0);
+  EXPECT_EQ(allocations_of<MbbrScheduledPipeline>(options()), 0);
+  EXPECT_EQ(allocations_of<MbbrThesisPipeline>(options()), 0);
 }
 
 /// From here on any system call but exit_group kills the process.
@@ -107,13 +115,11 @@ TEST(SystemCallFilter, CatchesOne) {
 }
 
 TEST_P(Tick, MakesNoSystemCall) {
-  ClosedLoop loop(options());
-  loop.balance(0.1);  // the first call through each shared-library function resolves it
+  ClosedLoop scheduled(options());
+  ClosedLoopWith<MbbrThesisPipeline> thesis(options());
   const int status = status_without_system_calls([&] {
-    loop.run(2.0, spinning());
-    loop.tick(spinning(), [](RawSample& raw, Command&) { raw.gyro_counts[0] = NAN; });
-    loop.run(0.05, Command{});
-    loop.run(0.5, ClosedLoop::armed());
+    fly(scheduled);
+    fly(thesis);
   });
   if (status == -1) GTEST_SKIP() << "no seccomp filters here";
   EXPECT_EQ(status, 0) << "killed by a system call in the tick";
