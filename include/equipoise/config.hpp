@@ -52,5 +52,7 @@ struct LoadedMbbr {
   std::string toml;    // the effective configuration
 };
 LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& overrides);
+/// From text, e.g. of a log; `origin` names it in errors.
+LoadedMbbr parse_mbbr(const std::string& text, const std::string& origin);
 
 }  // namespace equipoise

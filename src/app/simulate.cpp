@@ -6,6 +6,7 @@
 
 #include "equipoise/plant/mbbr_world.hpp"
 #include "equipoise/runtime/loop.hpp"
+#include "firmware.hpp"
 #include "plant_backend.hpp"
 
 namespace equipoise::app {
@@ -52,13 +53,11 @@ Command script(const SimOptions& o, double t) {
 }
 
 template <class Pipeline>
-SimSummary fly(const MbbrConfig& config, const WorldParams& world_params,
-               const typename Pipeline::Params& pipeline_params, const SimOptions& options,
-               const TickObserver& observe, const std::atomic<bool>& stop) {
+SimSummary fly(const MbbrConfig& config, const WorldParams& world_params, Pipeline& pipeline,
+               const SimOptions& options, const TickObserver& observe, const std::atomic<bool>& stop) {
   MbbrWorld world(config.robot, config.motor, config.calibration, world_params);
   PlantBackend<MbbrWorld> backend(world);
   Hardware hardware(backend.io());
-  Pipeline pipeline(pipeline_params);
   MbbrEstimators& estimators = pipeline.estimators();
 
   SimSummary summary;
@@ -111,33 +110,9 @@ SimSummary fly(const MbbrConfig& config, const WorldParams& world_params,
       done = true;
     }
     if (records) {
-      record.tick = tick;
-      record.now_ns = now_ns;
-      record.raw = raw;
-      record.velocity_W_m_s = {command.velocity_W_m_s.x(), command.velocity_W_m_s.y()};
-      record.yaw_rate_rad_s = command.yaw_rate_rad_s;
-      record.arm = command.arm;
-      record.heading_reset = command.heading_reset;
-      record.estimate = runtime::to_record(view(t.x_hat, config.robot));
-      record.reference = runtime::to_record(view(t.ref, config.robot));
+      record_tick(tick, now_ns, raw, command, t, pipeline, &record);
       record.truth = runtime::to_record(view(truth, config.robot));
       record.has_truth = true;
-      record.compared = 0;
-      if (options.compare) {
-        for (std::size_t i = 0; i < MbbrEstimators::kCount; ++i) {
-          record.others[i] =
-              runtime::to_record(view(estimators.estimate(static_cast<MbbrEstimatorId>(i)), config.robot));
-          record.compared |= 1U << i;
-        }
-      }
-      record.u_lin = {t.u_lin.x(), t.u_lin.y(), t.u_lin.z()};
-      record.u_friction = {t.u_friction.x(), t.u_friction.y(), t.u_friction.z()};
-      record.duty = t.motors.duty;
-      record.enable = t.motors.enable;
-      record.saturated = t.saturated;
-      record.arm_state = static_cast<std::int32_t>(t.arm_state);
-      record.reasons = t.reasons;
-      record.battery_V = t.z.battery_V;
       observe(record);
     }
     if (tick + 1 >= end_tick || stop.load(std::memory_order_relaxed)) done = true;
@@ -170,18 +145,17 @@ SimSummary fly(const MbbrConfig& config, const WorldParams& world_params,
 SimSummary simulate_mbbr(const MbbrConfig& configured, const SimOptions& options, const TickObserver& observe,
                          const std::atomic<bool>& stop) {
   const auto level = static_cast<std::size_t>(options.fidelity);
-  MbbrConfig config = configured;
+  Choice choice;
+  choice.estimator = kMbbrEstimatorNames[static_cast<std::size_t>(configured.estimators.active)];
+  choice.controller = kMbbrControllerNames[static_cast<std::size_t>(options.controller)];
+  choice.fidelity = kFidelityNames[level];
+  choice.compare = options.compare;
+  const MbbrConfig config = MbbrFirmware::apply(configured, choice);
   WorldParams world = config.world[level];
   world.seed = options.seed;
-  // The firmware is configured for the robot it is on: the level's bridge, and no compensation of absent
-  // friction.
-  config.motor.bridge = config.world_bridge[level];
-  if (!world.friction) config.friction.gain = 0.0;
-  config.estimators.compare = options.compare;
-  config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
-  return options.controller == MbbrController::kThesis
-             ? fly<MbbrThesisPipeline>(config, world, config.thesis_pipeline(), options, observe, stop)
-             : fly<MbbrScheduledPipeline>(config, world, config.scheduled_pipeline(), options, observe, stop);
+  return MbbrFirmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    return fly(config, world, pipeline, options, observe, stop);
+  });
 }
 
 }  // namespace equipoise::app

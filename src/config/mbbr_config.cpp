@@ -177,16 +177,7 @@ WorldParams read_world(Section s, BridgeType* bridge) {
   return w;
 }
 
-}  // namespace
-
-std::string robot_type(const std::string& path) {
-  const Document document(path, {});
-  Section root(document, document.root(), "");
-  return root.table("robot").text("type");
-}
-
-LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& overrides) {
-  const Document document(path, overrides);
+LoadedMbbr read_mbbr(const Document& document) {
   Section root(document, document.root(), "");
   LoadedMbbr loaded;
   MbbrConfig& c = loaded.config;
@@ -231,6 +222,22 @@ LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& ov
   loaded.sha256 = document.sha256();
   loaded.toml = document.canonical();
   return loaded;
+}
+
+}  // namespace
+
+std::string robot_type(const std::string& path) {
+  const Document document(path, {});
+  Section root(document, document.root(), "");
+  return root.table("robot").text("type");
+}
+
+LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& overrides) {
+  return read_mbbr(Document(path, overrides));
+}
+
+LoadedMbbr parse_mbbr(const std::string& text, const std::string& origin) {
+  return read_mbbr(Document::parse(text, origin));
 }
 
 MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {

@@ -88,6 +88,16 @@ Document::Document(const std::string& path, const std::vector<std::string>& over
   for (const std::string& text : overrides) apply_override(root_, text);
 }
 
+Document Document::parse(const std::string& text, const std::string& origin) {
+  Document document(origin);
+  try {
+    document.root_ = toml::parse(text, origin);
+  } catch (const toml::parse_error& error) {
+    throw ConfigError(at(origin, error.source()) + ": " + std::string(error.description()));
+  }
+  return document;
+}
+
 std::string Document::canonical() const {
   std::ostringstream text;
   text << root_;  // keys are sorted in a toml::table
@@ -165,6 +175,17 @@ std::string Section::text(const std::string& key) {
   const auto value = node(key).value_exact<std::string>();
   if (!value) fail(key, "expected a string");
   return *value;
+}
+
+std::pair<std::string, int> Section::text_and_integer(const std::string& key, int min, int max) {
+  const toml::array* pair = node(key).as_array();
+  if (pair == nullptr || pair->size() != 2) fail(key, "expected a pair of a string and a whole number");
+  const auto text = pair->get(0)->value_exact<std::string>();
+  const auto number = pair->get(1)->value_exact<std::int64_t>();
+  if (!text || !number) fail(key, "expected a pair of a string and a whole number");
+  if (*number < min || *number > max)
+    fail(key, std::to_string(*number) + " is out of range; " + range(min, max));
+  return {*text, static_cast<int>(*number)};
 }
 
 std::size_t Section::choice(const std::string& key, const std::vector<std::string>& names) {

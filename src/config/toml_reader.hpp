@@ -16,6 +16,8 @@ namespace equipoise::config {
 class Document {
  public:
   Document(const std::string& path, const std::vector<std::string>& overrides);
+  /// From text; `origin` takes the path's place in errors.
+  static Document parse(const std::string& text, const std::string& origin);
 
   const toml::table& root() const { return root_; }
   const std::string& path() const { return path_; }
@@ -24,6 +26,8 @@ class Document {
   std::string sha256() const;
 
  private:
+  explicit Document(std::string path) : path_(std::move(path)) {}
+
   std::string path_;
   toml::table root_;
 };
@@ -43,6 +47,8 @@ class Section {
   int integer(const std::string& key, int min, int max);
   bool boolean(const std::string& key);
   std::string text(const std::string& key);
+  /// A pair such as ["44e07000", 20].
+  std::pair<std::string, int> text_and_integer(const std::string& key, int min, int max);
   /// Index of the value in `names`.
   std::size_t choice(const std::string& key, const std::vector<std::string>& names);
   std::vector<double> numbers(const std::string& key, std::size_t count, double min, double max);
