@@ -1,0 +1,71 @@
+"""The experiments' framework, and the findings of those that take seconds."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from equipoise_tools.experiments import coverage, framework
+from equipoise_tools.experiments.framework import Result
+
+
+def result() -> Result:
+    made = Result(title="A title", command="do it", method="How.", differs="because.")
+    made.add("Table 6.1", "error", 0.5, 0.25, "rad")
+    made.add("Fig. 6.4", "no print", 2.0)
+    made.check("Table 6.1", "is small", False)
+    return made
+
+
+def test_values_have_a_ratio_only_where_there_is_a_printed_value():
+    values = result().values
+    assert values[0].ratio == 2.0
+    assert values[1].ratio is None
+
+
+def test_page_and_csv_say_ours_printed_ratio_and_why(tmp_path):
+    framework.write("some", result(), tmp_path)
+    page = (tmp_path / "some.md").read_text()
+    assert "| Table 6.1 | error | 0.5 | 0.25 | 2 | rad |" in page
+    assert "Why they differ: because." in page
+    assert "**no**" in page
+    assert (tmp_path / "some.csv").read_text().splitlines()[1] == "Table 6.1,error,0.5,0.25,2,rad"
+
+
+def test_summary_lists_every_target_and_does_not_hide_what_fails(tmp_path):
+    framework.write("some", result(), tmp_path)
+    summary = framework.summary(tmp_path)
+    for target in coverage.TARGETS:
+        assert f"| {target} |" in summary
+    assert "not reproduced; not so: is small" in summary
+    assert "| Fig. 6.4 | simulated ball speed without friction compensation | shown |" in summary
+    assert "| Table 3.3 | MIP attitude: RMSE of the estimators at 2, 5, 10 rad/s | not done |" in summary
+
+
+@pytest.mark.parametrize("name", framework.names())
+def test_experiments_name_what_they_cover(name):
+    module = framework.load(name)
+    assert module.COVERS
+    assert module.__doc__
+    assert callable(module.run)
+
+
+def test_committed_results_are_of_experiments_that_exist(root):
+    for file in (root / "docs" / "experiments").glob("*.json"):
+        assert file.stem in framework.names()
+        assert json.loads(file.read_text())["covers"]
+
+
+def test_unknown_names_are_refused():
+    command = [sys.executable, "-m", "equipoise_tools.experiments", "tabel"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "no experiment tabel; there are: " in done.stderr
+
+
+@pytest.mark.parametrize("name", ["geometry", "motor_selection"])
+def test_findings_of_the_quick_experiments_hold(name, tmp_path):
+    found = framework.load(name).run(tmp_path)
+    assert found.findings
+    assert [f.text for f in found.findings if not f.holds] == []
+    assert all((tmp_path / picture).stat().st_size > 10000 for picture in found.pictures)

@@ -1,0 +1,48 @@
+"""Runs the equipoise binary for an experiment: JSON out, and logs in a scratch folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import tempfile
+from pathlib import Path
+
+from ..log import Log, read_log
+from ..paths import UserError, repository_root
+
+
+def binary() -> Path:
+    path = Path(os.environ.get("EQUIPOISE_BINARY", repository_root() / "build" / "host" / "equipoise"))
+    if not path.exists():
+        raise UserError(f"{path}: not built; run tools/experiments, or cmake --build build/host")
+    return path
+
+
+def equipoise(*arguments: object, fails: bool = False) -> str:
+    """Standard output. A failed job (exit status 1) is an error unless `fails`: a robot may fall."""
+    command = [str(binary()), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=repository_root(), check=False)
+    if done.returncode not in ((0, 1) if fails else (0,)):
+        raise UserError(f"{' '.join(command)}: {done.stderr.strip() or done.returncode}")
+    return done.stdout
+
+
+def equipoise_json(*arguments: object) -> dict:
+    return json.loads(equipoise(*arguments, "--json", "-"))
+
+
+def simulate(
+    config: str = "config/mbbr.toml", sets: dict[str, object] | None = None, **options
+) -> tuple[dict, Log]:
+    """(summary, log) of a run; options become --yaw-hz and so on, `compare=True` a flag, `sets` --set."""
+    arguments: list[object] = ["sim", "--config", config, "--telemetry", "off", "--json", "-"]
+    for key, value in options.items():
+        flag = "--" + key.replace("_", "-")
+        arguments += [flag] if value is True else [flag, value]
+    for key, value in (sets or {}).items():
+        arguments += ["--set", f"{key}={value}"]
+    with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
+        log = Path(folder) / "run.lcm"
+        summary = json.loads(equipoise(*arguments, "--log", log, fails=True))
+        return summary, read_log(log)
