@@ -1,0 +1,133 @@
+#include "equipoise/actuate/drive_coast.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "equipoise/actuate/bridge.hpp"
+#include "support/oracle.hpp"
+
+namespace equipoise {
+namespace {
+
+TEST(DriveCoast, MatchesTheIntegratedSwitchingCircuit) {
+  const auto rows = test::oracle_rows("drive_coast");
+  ASSERT_EQ(rows.size(), 400U);
+  for (const auto& row : rows) {
+    const double i = drive_coast_mean_current(row["T_r"], row["omega_r"], row["u"]);
+    EXPECT_NEAR(i, row["i_over_is"].get<double>(), 1e-10);
+    const DriveCoastSolution back = drive_coast_invert(row["T_r"], row["omega_r"], row["i_over_is"]);
+    EXPECT_NEAR(drive_coast_mean_current(row["T_r"], row["omega_r"], back.u), row["i_over_is"].get<double>(),
+                1e-9);
+  }
+}
+
+/// Integration of (4.7)-(4.8) in periodic steady state, with the zero crossing found exactly.
+double switched_mean(double T_r, double omega_r, double v) {
+  const double high = 1.0 - omega_r;
+  const double low = -(1.0 + omega_r);
+  double i0 = 0.0;
+  double mean = 0.0;
+  for (int period = 0; period < 1000; ++period) {
+    const double i1 = high + (i0 - high) * std::exp(-v * T_r);
+    const double charge_high = high * v * T_r + (i0 - high) * -std::expm1(-v * T_r);
+    const double off = (1.0 - v) * T_r;
+    double drained = i1 > 0.0 ? std::log((i1 - low) / -low) : 0.0;
+    if (low == 0.0) drained = off;
+    const double t = std::min(drained, off);
+    const double charge_low = low * t + (i1 - low) * -std::expm1(-t);
+    i0 = t < off ? 0.0 : low + (i1 - low) * std::exp(-t);
+    mean = (charge_high + charge_low) / T_r;
+  }
+  return mean;
+}
+
+TEST(DriveCoast, ForwardModelAgreesWithSwitchingOverTheWholeDomain) {
+  for (const double T_r : {0.05, 0.289, 1.0, 5.0, 40.0}) {
+    for (const double w : {-0.99, -0.5, 0.0, 0.5, 0.99}) {
+      for (const double v : {0.01, 0.1, 0.4, 0.7, 0.95, 1.0}) {
+        EXPECT_NEAR(drive_coast_mean_current(T_r, w, v), switched_mean(T_r, w, v), 1e-9)
+            << "T_r " << T_r << " omega_r " << w << " v " << v;
+      }
+    }
+  }
+}
+
+TEST(DriveCoast, IsOddInSpeedAndCommandTogether) {
+  for (const double w : {-0.7, 0.0, 0.3}) {
+    for (const double u : {0.05, 0.5, 1.0}) {
+      EXPECT_DOUBLE_EQ(drive_coast_mean_current(0.289, w, u), -drive_coast_mean_current(0.289, -w, -u));
+    }
+  }
+}
+
+TEST(DriveCoast, RoundTripsThroughForwardModelBothSignsAndAllEdges) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  int most = 0;
+  for (int k = 0; k < 300000; ++k) {
+    const double T_r = std::pow(10.0, -4.0 + 7.0 * unit(random));
+    const double pick = unit(random);
+    const double edge = std::pow(10.0, -9.0 + 8.0 * unit(random));
+    const double w = pick < 0.5 ? 2.0 * unit(random) - 1.0 : (pick < 0.75 ? 1.0 - edge : edge - 1.0);
+    const double v = unit(random) < 0.5 ? unit(random) : std::pow(10.0, -5.0 + 5.0 * unit(random));
+    const double u = unit(random) < 0.5 ? v : -v;
+    const double target = drive_coast_mean_current(T_r, w, u);
+    const DriveCoastSolution solution = drive_coast_invert(T_r, w, target);
+    most = std::max(most, solution.iterations);
+    ASSERT_NEAR(drive_coast_mean_current(T_r, w, solution.u), target, 1e-13 + 1e-9 * std::abs(target));
+    // u itself is only determined as well as the current's slope, d|i|/dv, transports one rounding of the
+    // current.
+    const double d = 0.5 * (1.0 - std::copysign(1.0, u) * w);
+    const double decayed = -std::expm1(-v * T_r);
+    const double slope = 2.0 * decayed * d / (1.0 - d + d * decayed);
+    if (target != 0.0 && slope > 1e-6) {
+      ASSERT_NEAR(solution.u, u, 1e-9) << T_r << " " << w;
+    }
+  }
+  EXPECT_LE(most, kDriveCoastMaxIterations - 1) << "the iteration bound is never reached";
+}
+
+TEST(DriveCoast, LimitsOfVeryHighAndVeryLowPwmFrequency) {
+  // (4.35), (4.36)
+  EXPECT_NEAR(drive_coast_invert(0.0, 0.3, 0.2).u, (0.2 + 1.0 + 0.3) / 2.0, 1e-12);
+  EXPECT_NEAR(drive_coast_invert(1e9, 0.3, 0.2).u, 0.2 / (1.0 - 0.3), 1e-8);
+  EXPECT_NEAR(drive_coast_invert(1e9, 0.3, -0.2).u, -0.2 / (1.0 + 0.3), 1e-8);
+}
+
+TEST(DriveCoast, UnreachableTargetsClampAndSaySo) {
+  const DriveCoastSolution more = drive_coast_invert(0.289, 0.5, 0.6);  // at most 1 - 0.5
+  EXPECT_EQ(more.u, 1.0);
+  EXPECT_FALSE(more.reachable);
+  const DriveCoastSolution spinning = drive_coast_invert(0.289, 1.0, 0.01);
+  EXPECT_EQ(spinning.u, 1.0);
+  EXPECT_FALSE(spinning.reachable);
+  EXPECT_EQ(drive_coast_invert(0.289, 0.5, 0.0).u, 0.0);
+}
+
+TEST(Bridge, ScalesWithTheBatteryAndIgnoresImplausibleReadings) {
+  MotorParameters motor;
+  motor.bridge = BridgeType::kDriveBrake;
+  const Bridge bridge(motor);
+  EXPECT_DOUBLE_EQ(bridge.invert(0.5, 0.0, 6.4), 0.5 * 8.0 / 6.4);
+  EXPECT_EQ(bridge.supply_V(7.4, true), 7.4);
+  EXPECT_EQ(bridge.supply_V(7.4, false), 8.0);
+  EXPECT_EQ(bridge.supply_V(1.0, true), 8.0);
+  EXPECT_EQ(bridge.supply_V(std::nan(""), true), 8.0);
+}
+
+TEST(Bridge, DriveCoastGivesTheLinearMotorsCurrent) {
+  const MotorParameters motor;
+  const Bridge bridge(motor);
+  for (const double u : {-0.6, -0.1, 0.05, 0.4}) {
+    for (const double speed : {-30.0, 0.0, 12.0}) {
+      const double omega_r = speed / motor.no_load_rad_s(7.0);
+      const double duty = bridge.invert(u, speed, 7.0);
+      EXPECT_NEAR(drive_coast_mean_current(motor.T_r(), omega_r, duty), u * 8.0 / 7.0 - omega_r, 1e-12);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace equipoise

@@ -1,0 +1,100 @@
+#include "equipoise/config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace equipoise {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::string kMbbr = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
+
+std::string error_of(const std::string& path, const std::vector<std::string>& overrides = {}) {
+  try {
+    load_mbbr(path, overrides);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// The shipped file with one text replaced.
+class EditedConfig {
+ public:
+  EditedConfig(const std::string& from, const std::string& to) {
+    std::ifstream in(kMbbr);
+    std::stringstream text;
+    text << in.rdbuf();
+    std::string edited = text.str();
+    const std::size_t at = edited.find(from);
+    EXPECT_NE(at, std::string::npos);
+    edited.replace(at, from.size(), to);
+    path_ = testing::TempDir() + "edited_" + std::to_string(::getpid()) + "_" +
+            std::to_string(instances_++) + ".toml";
+    std::ofstream(path_) << edited;
+    line_ = 1 + std::count(edited.begin(), edited.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+  }
+  ~EditedConfig() { std::filesystem::remove(path_); }
+  const std::string& path() const { return path_; }
+  std::string where() const { return path_ + ":" + std::to_string(line_) + ":"; }
+
+ private:
+  std::string path_;
+  std::ptrdiff_t line_ = 0;
+  static inline int instances_ = 0;
+};
+
+TEST(Config, TheShippedFileLoads) {
+  const LoadedMbbr loaded = load_mbbr(kMbbr, {});
+  EXPECT_EQ(loaded.config.robot.m_t, 0.550);
+  EXPECT_EQ(loaded.sha256.size(), 64U);
+  EXPECT_EQ(loaded.sha256, load_mbbr(kMbbr, {}).sha256);
+}
+
+TEST(Config, UnknownKeyNamesFileLineAndTheKeyThatWasMeant) {
+  const EditedConfig file("ball_radius_m", "ball_radus_m");
+  EXPECT_THAT(error_of(file.path()), HasSubstr("robot.ball_radius_m: missing"));
+  const EditedConfig extra("max_tilt_rad = 0.6", "max_tilt_rad = 0.6\nmax_tild_rad = 0.6");
+  EXPECT_THAT(error_of(extra.path()),
+              HasSubstr("safety.max_tild_rad: unknown key; did you mean max_tilt_rad?"));
+}
+
+TEST(Config, OutOfRangeNamesLineAndAllowedRange) {
+  const EditedConfig file("max_tilt_rad = 0.6", "max_tilt_rad = 6.0");
+  EXPECT_THAT(error_of(file.path()),
+              HasSubstr(file.where() + " safety.max_tilt_rad: 6 is out of range; allowed: 0.05 to 1.5"));
+}
+
+TEST(Config, WrongTypesAndNanAreRefused) {
+  const EditedConfig text("max_tilt_rad = 0.6", "max_tilt_rad = \"steep\"");
+  EXPECT_THAT(error_of(text.path()), HasSubstr("expected a number"));
+  const EditedConfig nan("max_tilt_rad = 0.6", "max_tilt_rad = nan");
+  EXPECT_THAT(error_of(nan.path()), HasSubstr("out of range"));
+  const EditedConfig syntax("max_tilt_rad = 0.6", "max_tilt_rad = = 0.6");
+  EXPECT_THAT(error_of(syntax.path()), HasSubstr(syntax.where()));
+}
+
+TEST(Config, OverridesApplyAndAreChecked) {
+  EXPECT_EQ(load_mbbr(kMbbr, {"friction.compensation=0.8"}).config.friction.gain, 0.8);
+  EXPECT_NE(load_mbbr(kMbbr, {"friction.compensation=0.8"}).sha256, load_mbbr(kMbbr, {}).sha256);
+  EXPECT_EQ(load_mbbr(kMbbr, {"reference.filter_frame=yaw"}).config.reference.frame, FilterFrame::kYaw);
+  EXPECT_THAT(error_of(kMbbr, {"friction.compensatio=0.8"}), HasSubstr("no such key"));
+  EXPECT_THAT(error_of(kMbbr, {"friction.compensation=9"}), HasSubstr("allowed: 0 to 1.5"));
+  EXPECT_THAT(error_of(kMbbr, {"friction"}), HasSubstr("expected key=value"));
+}
+
+TEST(Config, AMountThatIsNoRotationIsRefused) {
+  EXPECT_THAT(error_of(kMbbr, {"calibration.R_BS=[1,0,0,0,1,0,0,0,-1]"}), HasSubstr("not a rotation matrix"));
+}
+
+TEST(Config, MissingFileSaysWhatToDo) { EXPECT_THAT(error_of("nowhere.toml"), HasSubstr("--config FILE")); }
+
+}  // namespace
+}  // namespace equipoise

@@ -1,0 +1,164 @@
+#include <gtest/gtest.h>
+
+#include "equipoise/control/friction.hpp"
+#include "equipoise/control/mbbr_scheduled_feedback.hpp"
+#include "equipoise/control/mbbr_thesis_feedback.hpp"
+
+namespace equipoise {
+namespace {
+
+MbbrReferenceParams reference_params() {
+  MbbrReferenceParams p;
+  p.schedule.rows = 2;
+  p.schedule.at = {0.0, 2.0 * kPi};
+  p.schedule.row[0] = {0.2, 0.97, 10.0};
+  p.schedule.row[1] = {0.1, 0.96, 15.0};
+  p.max_acceleration_m_s2 = 1e6;
+  p.max_yaw_acceleration_rad_s2 = 1e6;
+  return p;
+}
+
+MbbrThesisFeedbackParams thesis_params() {
+  MbbrThesisFeedbackParams p;
+  p.schedule.rows = 2;
+  p.schedule.at = {0.0, kPi};
+  p.schedule.row[0] = {10.0, 0.4, 0.5, 0.075, 0.4, 1.2};
+  p.schedule.row[1] = {12.0, 0.4, 0.5, 0.10, 0.4, 1.2};
+  return p;
+}
+
+TEST(GainSchedule, InterpolatesWithoutJumpsAndHoldsBeyondTheEnds) {
+  const auto schedule = thesis_params().schedule;
+  EXPECT_DOUBLE_EQ(schedule(0.0)[0], 10.0);
+  EXPECT_DOUBLE_EQ(schedule(0.5 * kPi)[0], 11.0);
+  EXPECT_DOUBLE_EQ(schedule(100.0)[0], 12.0);
+  double previous = schedule(0.0)[0];
+  for (double x = 0.0; x < 4.0; x += 0.01) {
+    const double now = schedule(x)[0];
+    EXPECT_LT(std::abs(now - previous), 0.01);
+    previous = now;
+  }
+}
+
+TEST(MbbrReference, LeansTowardsTheTravel) {
+  MbbrReferenceStage stage(reference_params());
+  stage.reset(MbbrEstimate{});
+  Command command;
+  command.velocity_W_m_s = Vec2(0.2, 0.0);
+  MbbrReference ref;
+  for (int k = 0; k < 50; ++k) ref = stage.update(command, MbbrEstimate{});
+  // +x travel needs +phi_y, and a positive theta_y accelerates it.
+  EXPECT_GT(ref.d_phi_dot.y(), 0.0);
+  EXPECT_GT(ref.theta_xy.y(), 0.0);
+  EXPECT_NEAR(ref.theta_xy.x(), 0.0, 1e-12);
+}
+
+TEST(MbbrReference, IntegratesCommandsAndTurnsThemWithTheHeading) {
+  MbbrReferenceStage stage(reference_params());
+  MbbrEstimate x;
+  x.theta_z = kPi / 2.0;  // "forward" is where the robot looked when it started
+  stage.reset(x);
+  Command command;
+  command.velocity_W_m_s = Vec2(0.1, 0.0);
+  command.yaw_rate_rad_s = 1.0;
+  MbbrReference ref;
+  for (int k = 0; k < 200; ++k) ref = stage.update(command, x);
+  const Vec2 position = ball_velocity(0.032, ref.phi);
+  EXPECT_NEAR(position.x(), 0.0, 1e-9);
+  EXPECT_NEAR(position.y(), 0.1, 1e-9);
+  EXPECT_NEAR(ref.theta_z, kPi / 2.0 + 1.0, 1e-9);
+}
+
+TEST(MbbrReference, InertialFiltersDoNotLagWithTheSpin) {
+  // Given a constant inertial rate error and a spinning robot, the inertial low-pass reaches it exactly; in
+  // the yaw frame it is attenuated and rotated.
+  for (const FilterFrame frame : {FilterFrame::kInertial, FilterFrame::kYaw}) {
+    MbbrReferenceParams p = reference_params();
+    p.frame = frame;
+    MbbrReferenceStage stage(p);
+    stage.reset(MbbrEstimate{});
+    MbbrEstimate x;
+    Command command;
+    command.velocity_W_m_s = Vec2(0.32, 0.0);
+    command.yaw_rate_rad_s = 2.0 * kPi;
+    MbbrReference ref;
+    for (int k = 0; k < 400; ++k) {
+      x.theta_z = 2.0 * kPi * k * kTickS;
+      ref = stage.update(command, x);
+    }
+    const double lag = (ref.d_phi_dot - ref.d_phi_dot_unfiltered).norm() / ref.d_phi_dot_unfiltered.norm();
+    if (frame == FilterFrame::kInertial) {
+      EXPECT_LT(lag, 1e-3);
+    } else {
+      EXPECT_GT(lag, 0.2);
+    }
+  }
+}
+
+TEST(MbbrReference, SlewLimitsBoundTheReference) {
+  MbbrReferenceParams p = reference_params();
+  p.max_acceleration_m_s2 = 0.5;
+  p.max_yaw_acceleration_rad_s2 = 2.0;
+  MbbrReferenceStage stage(p);
+  stage.reset(MbbrEstimate{});
+  Command command;
+  command.velocity_W_m_s = Vec2(1.0, 0.0);
+  command.yaw_rate_rad_s = 5.0;
+  const MbbrReference ref = stage.update(command, MbbrEstimate{});
+  EXPECT_NEAR(ball_velocity(0.032, ref.phi_dot_star).x(), 0.5 * kTickS, 1e-12);
+  EXPECT_NEAR(ref.yaw_rate, 2.0 * kTickS, 1e-12);
+}
+
+TEST(MbbrThesisFeedback, IsMinusKTimesTheErrorWithTheScheduledGains) {
+  const MbbrThesisFeedback feedback(thesis_params());
+  MbbrReference ref;
+  ref.d_theta = Vec2(0.01, -0.02);
+  ref.d_phi = Vec2(1.0, 2.0);
+  ref.d_rate = Vec2(0.1, 0.3);
+  ref.d_phi_dot = Vec2(0.5, -0.5);
+  ref.d_theta_z = 0.2;
+  ref.d_yaw_rate = 0.4;
+  const Vec3 u = feedback.update(ref);
+  EXPECT_NEAR(u.x(), -(10 * 0.01 + 0.4 * 1.0 + 0.5 * 0.1 + 0.075 * 0.5), 1e-12);
+  EXPECT_NEAR(u.y(), -(10 * -0.02 + 0.4 * 2.0 + 0.5 * 0.3 + 0.075 * -0.5), 1e-12);
+  EXPECT_NEAR(u.z(), -(0.4 * 0.2 + 1.2 * 0.4), 1e-12);
+}
+
+TEST(MbbrThesisFeedback, FeedsTheSteadyYawTorqueForward) {
+  const MbbrThesisFeedback feedback(thesis_params());
+  MbbrReference ref;
+  ref.yaw_rate = 2.0 * kPi * 1.5;
+  EXPECT_NEAR(feedback.update(ref).z(), -0.65, 0.01);  // 0.65 at 1.5 Hz
+}
+
+TEST(MbbrScheduledFeedback, CrossGainsGrowWithTheSpinAndMirrorWithItsSign) {
+  const MbbrScheduledFeedback feedback({});
+  const auto cross = [&](double hz) {
+    MbbrReference ref;
+    ref.yaw_rate = 2.0 * kPi * hz;
+    ref.d_theta = Vec2(0.0, 0.1);
+    return feedback.update(ref).x();
+  };
+  EXPECT_NEAR(cross(0.0), 0.0, 1e-12);
+  EXPECT_GT(std::abs(cross(3.0)), std::abs(cross(1.0)));
+  EXPECT_NEAR(cross(2.0), -cross(-2.0), 1e-12);
+}
+
+TEST(MbbrScheduledFeedback, LeanIsCorrectedByDrivingTheBallUnderIt) {
+  const MbbrScheduledFeedback feedback({});
+  MbbrReference ref;
+  ref.d_theta = Vec2(-0.05, 0.0);            // the estimate leans by +0.05
+  EXPECT_GT(feedback.update(ref).x(), 0.0);  // +u_x pushes theta_x negative
+}
+
+TEST(FrictionCompensation, SmoothSignReaches95PercentAtOneAndAHalf) {
+  EXPECT_NEAR(FrictionCompensation::smooth_sign(1.5), 0.95, 0.001);
+  EXPECT_EQ(FrictionCompensation::smooth_sign(0.0), 0.0);
+  EXPECT_DOUBLE_EQ(FrictionCompensation::smooth_sign(-0.7), -FrictionCompensation::smooth_sign(0.7));
+  FrictionCompensation friction;
+  friction.coulomb_u = 0.3;
+  EXPECT_NEAR(friction.compensate(Vec3(50.0, -50.0, 0.0)).x(), 0.3, 1e-12);
+}
+
+}  // namespace
+}  // namespace equipoise
