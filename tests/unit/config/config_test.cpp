@@ -36,8 +36,8 @@ class EditedConfig {
     const std::size_t at = edited.find(from);
     EXPECT_NE(at, std::string::npos);
     edited.replace(at, from.size(), to);
-    path_ = testing::TempDir() + "edited_" + std::to_string(::getpid()) + "_" +
-            std::to_string(instances_++) + ".toml";
+    path_ = testing::TempDir() + "edited_" + std::to_string(::getpid()) + "_" + std::to_string(instances_++) +
+            ".toml";
     std::ofstream(path_) << edited;
     line_ = 1 + std::count(edited.begin(), edited.begin() + static_cast<std::ptrdiff_t>(at), '\n');
   }
