@@ -60,6 +60,20 @@ def drive_phases(log: Log) -> list[tuple[float, float]]:
     return spans(wanted, log.seconds(names.COMMAND))
 
 
+def error_range(curves: list[np.ndarray]) -> tuple[float, float]:
+    """Of a logarithmic axis: without the dips through zero, with room for the legend."""
+    values = np.concatenate(curves)
+    values = values[values > 0]
+    return (float(np.percentile(values, 1)) / 2, 20 * float(values.max())) if values.size else (0.1, 1.0)
+
+
+def legend_beside_title(axes: plt.Axes, columns: int) -> None:
+    """Above the panel, where no curve is under it."""
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=columns, borderaxespad=0.0, columnspacing=1.0
+    )
+
+
 @dataclass(frozen=True)
 class Trace:
     """How a channel is drawn in every panel."""
@@ -147,8 +161,20 @@ class Report:
         self.finish_time_axis(axes)
 
     def heading(self, axes: plt.Axes) -> None:
-        self.lines(axes, lambda channel: heading_rad(self.log, channel) / (2 * np.pi))
-        axes.set(title="Heading", ylabel="turns")
+        """Where it should turn with the reference, its departure from it shows what matters."""
+        if names.REFERENCE in self.log:
+            wanted = heading_rad(self.log, names.REFERENCE)
+            t_s = self.log.seconds(names.REFERENCE)
+            self.lines(
+                axes,
+                lambda channel: np.degrees(
+                    heading_rad(self.log, channel) - np.interp(self.log.seconds(channel), t_s, wanted)
+                ),
+            )
+            axes.set(title="Heading, departure from the reference", ylabel="deg")
+        else:
+            self.lines(axes, lambda channel: heading_rad(self.log, channel) / (2 * np.pi))
+            axes.set(title="Heading", ylabel="turns")
         self.finish_time_axis(axes)
 
     def track(self, axes: plt.Axes) -> None:
@@ -178,7 +204,7 @@ class Report:
                 label=f"motor {motor + 1}",
             )
         axes.set(title="Duty", ylabel="of full", ylim=(-1.05, 1.05))
-        axes.legend(loc="lower right", ncols=count)
+        legend_beside_title(axes, count)
         self.finish_time_axis(axes)
 
     def errors(self, what: str, title: str, unit: str, scale: float) -> Panel:
@@ -196,8 +222,14 @@ class Report:
                     zorder=9 - 0.1 * index,
                 )
             axes.set(title=title, ylabel=unit)
-            axes.set_ylim(bottom=0)
-            axes.legend(loc="upper right", ncols=2)
+            if len(self.summary.estimators) > 1:  # they differ by orders of magnitude
+                axes.set_yscale("log")
+                axes.set_ylim(*error_range([line.get_ydata() for line in axes.lines]))
+            else:
+                axes.set_ylim(bottom=0)
+            axes.legend(
+                loc="upper right", ncols=2, frameon=True, facecolor="white", edgecolor="none", framealpha=0.8
+            )
             self.finish_time_axis(axes)
 
         return draw
@@ -222,10 +254,10 @@ class Report:
         if names.MOTORS in log:
             panels += [self.duties]
         if self.summary.estimators:
-            panels += [self.errors("attitude_rad", "Attitude error (smoothed)", "mrad", 1000)]
+            panels += [self.errors("attitude_rad", "Attitude error, smoothed", "mrad", 1000)]
             rolling = "Ball" if self.axes_count == 2 else "Wheel"
             scale, unit = rolling_unit(log)
-            panels += [self.errors("rolling_rad_s", f"{rolling} speed error (smoothed)", unit, scale)]
+            panels += [self.errors("rolling_rad_s", f"{rolling} speed error, smoothed", unit, scale)]
         return panels
 
 
