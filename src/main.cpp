@@ -5,8 +5,9 @@
 #include "app/commands.hpp"
 #include "equipoise/config.hpp"
 
-/// Exit codes: 0 success, 1 a job that failed, 2 bad usage or input.
-int main(int argc, char** argv) {
+namespace {
+
+int run(int argc, char** argv) {
   CLI::App app{"Equipoise: firmware and simulator of two balancing robots"};
   app.set_version_flag("--version", EQUIPOISE_VERSION);
   app.require_subcommand(1);
@@ -20,6 +21,15 @@ int main(int argc, char** argv) {
     const bool help = error.get_exit_code() == 0;
     app.exit(error);
     return help ? 0 : 2;
+  }
+}
+
+}  // namespace
+
+/// Exit codes: 0 success, 1 a job that failed, 2 bad usage or input.
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
   } catch (const equipoise::ConfigError& error) {
     std::fprintf(stderr, "equipoise: %s\n", error.what());
     return 2;

@@ -219,15 +219,16 @@ void Section::finish() const {
   for (const auto& [key, value] : table_) {
     const std::string name(key.str());
     if (asked_.count(name) != 0) continue;
-    std::string hint;
+    std::string nearest;
     std::size_t best = 4;
     for (const std::string& known : asked_) {
       const std::size_t d = distance(name, known);
       if (d < best) {
         best = d;
-        hint = "; did you mean " + known + "?";
+        nearest = known;
       }
     }
+    const std::string hint = nearest.empty() ? "" : "; did you mean " + nearest + "?";
     throw ConfigError(at(document_.path(), value.source()) + ": " +
                       (name_.empty() ? name : name_ + "." + name) + ": unknown key" + hint);
   }

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import names
 from .lcm_types import decode_messages
 from .paths import UserError
 
@@ -28,7 +29,7 @@ class Log(dict):
         self.start_utime = 0
 
     def seconds(self, channel: str) -> np.ndarray:
-        """Time of each message since the log's first one."""
+        """Time of each message since the start."""
         return (self[channel]["utime"] - self.start_utime) * 1e-6
 
     @property
@@ -96,6 +97,7 @@ def read_log(path: str | Path) -> Log:
         log.notes.append(f"channel {channel}: {count} messages of an unknown type or version are left out")
     if not log:
         raise UserError(f"{path}: holds no message of a type this version knows ({'; '.join(log.notes)})")
-    # A record array counts, a description of the run does not: on a robot the clock starts at its boot.
-    log.start_utime = min((int(r["utime"][0]) for r in log.values() if r.dtype.names), default=0)
+    # Simulated clocks start at 0. A robot's starts at its boot, its log with the first sample.
+    if names.TRUTH not in log:
+        log.start_utime = min((int(r["utime"][0]) for r in log.values() if r.dtype.names), default=0)
     return log

@@ -9,7 +9,8 @@ import numpy as np
 from . import names
 from .log import Log
 
-SETTLE_S = 5.0  # errors count after it, as in `equipoise sim --json`
+# Errors count from 5 s on, as in `equipoise sim --json`; less half a tick, for time stamps are rounded.
+SETTLE_S = 5.0 - 0.0025
 FALLEN_RAD = 0.6  # the safety gate's default tilt limit
 SATURATED = 1.0 - 1e-9
 

@@ -2,7 +2,6 @@
 // In: input, measurements with a mask of those to use -> state, covariance, normalised innovation.
 // Measurements are applied one scalar at a time in Joseph form, which equals the batch update for diagonal R
 // and keeps P symmetric to the bit without a matrix inverse. RT-safe: fixed size, bounded.
-//
 // A Model supplies kStates, kInputs, kOutputs and
 //   void predict(const Vec<n>& x, const Vec<p>& u, Vec<n>& x_next, Mat<n, n>& F) const noexcept;
 //   Mat<n, p> input_matrix() const noexcept;  // change of x_next per unit of u, near the operating point
