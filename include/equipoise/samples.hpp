@@ -68,4 +68,11 @@ struct StateView {
   double normalized_innovation = 0.0;  // NIS / degrees of freedom; 0 where there is no filter
 };
 
+/// Squared errors of an estimate, summed over `axes`, for metrics. Speed: MBBR, m/s; MIP, rad/s.
+struct StateErrors {
+  double attitude_squared = 0.0;
+  double speed_squared = 0.0;
+  int axes = 1;
+};
+
 }  // namespace equipoise

@@ -6,6 +6,25 @@ namespace equipoise::app {
 
 std::string version() { return EQUIPOISE_VERSION; }
 
+namespace {
+
+std::string joined(const std::string& robot, const std::vector<std::string>& names) {
+  std::string text = robot + ":";
+  for (const std::string& name : names) text += (&name == &names.front() ? " " : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+std::string known_estimators() { return joined(MbbrFirmware::kName, MbbrFirmware::estimators()); }
+std::string known_controllers() { return joined(MbbrFirmware::kName, MbbrFirmware::controllers()); }
+
+std::size_t fidelity_level(const std::string& name) {
+  const auto level = std::find(kFidelityNames.begin(), kFidelityNames.end(), name);
+  if (level == kFidelityNames.end()) throw ConfigError("fidelity \"" + name + "\" is unknown");
+  return static_cast<std::size_t>(level - kFidelityNames.begin());
+}
+
 MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choice) {
   MbbrConfig config = configured;
   for (std::size_t i = 0; i < kMbbrEstimatorNames.size(); ++i) {
@@ -16,9 +35,8 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
   // In simulation the firmware is configured for the robot it is on: the level's bridge, and no compensation
   // of absent friction.
-  const auto level = std::find(kFidelityNames.begin(), kFidelityNames.end(), choice.fidelity);
-  if (level != kFidelityNames.end()) {
-    const auto i = static_cast<std::size_t>(level - kFidelityNames.begin());
+  if (!choice.fidelity.empty()) {
+    const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
     if (!config.world[i].friction) config.friction.gain = 0.0;
   }

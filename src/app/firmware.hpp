@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
+#include "equipoise/plant/mbbr_world.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 
@@ -24,13 +25,21 @@ struct Choice {
   bool compare = false;
 };
 
+/// Index of a name of kFidelityNames; ConfigError when it is none.
+std::size_t fidelity_level(const std::string& name);
+
 struct MbbrFirmware {
   using Robot = Mbbr;
   using Config = MbbrConfig;
   using Loaded = LoadedMbbr;
+  using World = MbbrWorld;
   static constexpr const char* kName = "mbbr";
   static constexpr const char* kDefaultEstimator = "ekf";
   static constexpr const char* kDefaultController = "scheduled";
+  static constexpr const char* kSpeedRmseKey = "ball_speed_rmse_m_s";
+  static constexpr const char* kSpeedLabel = "ball speed RMSE";
+  static constexpr const char* kSpeedUnit = "cm/s";
+  static constexpr double kSpeedScale = 100.0;
 
   static Loaded load(const std::string& path, const std::vector<std::string>& overrides) {
     return load_mbbr(path, overrides);
@@ -55,6 +64,13 @@ struct MbbrFirmware {
     MbbrScheduledPipeline pipeline(config.scheduled_pipeline());
     return f(pipeline);
   }
+
+  /// `config` as it flies; `level` of fidelity.
+  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
+    WorldParams params = config.world[level];
+    params.seed = seed;
+    return World(config.robot, config.motor, config.calibration, params);
+  }
 };
 
 /// f(firmware) for the robot named `type`; ConfigError when there is none. `where`: file, for the message.
@@ -63,6 +79,10 @@ auto with_robot(const std::string& type, const std::string& where, F&& f) {
   if (type == MbbrFirmware::kName) return f(MbbrFirmware{});
   throw ConfigError(where + ": robot.type: \"" + type + "\" cannot be flown by this build; allowed: mbbr");
 }
+
+/// Of all robots, for help texts: "mbbr: a, b".
+std::string known_estimators();
+std::string known_controllers();
 
 /// ConfigError unless estimator and controller are known to this robot; empty ones become its defaults.
 template <class Firmware>

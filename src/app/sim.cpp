@@ -18,9 +18,8 @@ void on_signal(int) { interrupted.store(true); }
 struct Arguments {
   std::string config;
   SimOptions options;
-  std::string estimator = "ekf";
-  std::string controller = "scheduled";
-  std::string fidelity = "full";
+  Choice choice;
+  double yaw_hz = 0.0;
   std::string attitude = "dmp";
   std::vector<std::string> set;
   std::string log;
@@ -29,25 +28,26 @@ struct Arguments {
   std::string telemetry = runtime::kDefaultTelemetryUrl;
 };
 
+template <class Firmware>
 nlohmann::json to_json(const Arguments& a, const SimSummary& s, const std::string& config_sha256) {
   nlohmann::json estimators = nlohmann::json::object();
   for (const auto& [name, errors] : s.estimators) {
     estimators[name] = {{"attitude_rmse_rad", errors.attitude_rmse_rad},
-                        {"ball_speed_rmse_m_s", errors.ball_speed_rmse_m_s}};
+                        {Firmware::kSpeedRmseKey, errors.speed_rmse}};
   }
-  return {{"robot", "mbbr"},
+  return {{"robot", Firmware::kName},
           {"seed", a.options.seed},
-          {"estimator", a.estimator},
-          {"controller", a.controller},
-          {"fidelity", a.fidelity},
+          {"estimator", a.choice.estimator},
+          {"controller", a.choice.controller},
+          {"fidelity", a.choice.fidelity},
           {"attitude", a.attitude},
-          {"yaw_hz", a.options.yaw_hz},
+          {"yaw_hz", a.options.yaw_rate_rad_s / (2.0 * kPi)},
           {"drive_mps", a.options.drive_mps},
           {"duration_s", static_cast<double>(s.ticks) * kTickS},
           {"fell", s.fell},
           {"fell_at_s", s.fell ? nlohmann::json(s.fell_at_s) : nlohmann::json(nullptr)},
           {"attitude_rmse_rad", s.controlling.attitude_rmse_rad},
-          {"ball_speed_rmse_m_s", s.controlling.ball_speed_rmse_m_s},
+          {Firmware::kSpeedRmseKey, s.controlling.speed_rmse},
           {"position_rmse_m", s.position_rmse_m},
           {"yaw_rate_mean_hz", s.yaw_rate_mean_hz},
           {"duty_max", s.duty_max},
@@ -58,9 +58,10 @@ nlohmann::json to_json(const Arguments& a, const SimSummary& s, const std::strin
           {"log", a.log},
           {"estimators", estimators},
           {"config_sha256", config_sha256},
-          {"version", EQUIPOISE_VERSION}};
+          {"version", version()}};
 }
 
+template <class Firmware>
 void print_summary(std::FILE* out, const Arguments& a, const SimSummary& s) {
   const double seconds = static_cast<double>(s.ticks) * kTickS;
   if (s.fell) {
@@ -68,20 +69,22 @@ void print_summary(std::FILE* out, const Arguments& a, const SimSummary& s) {
   } else {
     std::fprintf(out, "%s after %.1f s", s.interrupted ? "Interrupted, upright" : "Upright", seconds);
   }
-  std::fprintf(out, "  (%s, %s, %s, seed %llu)\n", a.estimator.c_str(), a.controller.c_str(),
-               a.fidelity.c_str(), static_cast<unsigned long long>(a.options.seed));
+  std::fprintf(out, "  (%s, %s, %s, %s, seed %llu)\n", Firmware::kName, a.choice.estimator.c_str(),
+               a.choice.controller.c_str(), a.choice.fidelity.c_str(),
+               static_cast<unsigned long long>(a.options.seed));
   std::fprintf(out, "  yaw rate        %8.3f Hz\n", s.yaw_rate_mean_hz);
   std::fprintf(out, "  attitude RMSE   %8.4f rad\n", s.controlling.attitude_rmse_rad);
-  std::fprintf(out, "  ball speed RMSE %8.2f cm/s\n", 100.0 * s.controlling.ball_speed_rmse_m_s);
+  std::fprintf(out, "  %s %7.2f %s\n", Firmware::kSpeedLabel,
+               Firmware::kSpeedScale * s.controlling.speed_rmse, Firmware::kSpeedUnit);
   std::fprintf(out, "  position RMSE   %8.3f m\n", s.position_rmse_m);
   std::fprintf(out, "  duty max        %8.3f, saturated %.2f %% of the time\n", s.duty_max,
                100.0 * s.saturated_fraction);
   std::fprintf(out, "  simulated at    %8.0f x real time\n", s.real_time_factor);
   if (s.estimators.size() > 1) {
-    std::fprintf(out, "  %-18s %14s %18s\n", "estimator", "attitude, rad", "ball speed, cm/s");
+    std::fprintf(out, "  %-18s %14s %12s, %s\n", "estimator", "attitude, rad", "speed", Firmware::kSpeedUnit);
     for (const auto& [name, e] : s.estimators) {
       std::fprintf(out, "  %-18s %14.4f %18.2f\n", name.c_str(), e.attitude_rmse_rad,
-                   100.0 * e.ball_speed_rmse_m_s);
+                   Firmware::kSpeedScale * e.speed_rmse);
     }
   }
 }
@@ -118,23 +121,14 @@ class Pace {
 
 std::string default_log(const Arguments& a) {
   std::filesystem::create_directories("logs");
-  return "logs/sim-" + a.estimator + "-" + a.fidelity + "-seed" + std::to_string(a.options.seed) + ".lcm";
+  return "logs/sim-" + a.choice.estimator + "-" + a.choice.fidelity + "-seed" +
+         std::to_string(a.options.seed) + ".lcm";
 }
 
+template <class Firmware>
 int run(Arguments a) {
-  if (robot_type(a.config) != "mbbr") {
-    throw ConfigError(a.config + ": robot.type: \"" + robot_type(a.config) +
-                      "\" cannot be simulated by this build");
-  }
-  LoadedMbbr loaded = load_mbbr(a.config, a.set);
-  for (std::size_t i = 0; i < kMbbrEstimatorNames.size(); ++i) {
-    if (a.estimator == kMbbrEstimatorNames[i])
-      loaded.config.estimators.active = static_cast<MbbrEstimatorId>(i);
-  }
-  a.options.controller = a.controller == "thesis" ? MbbrController::kThesis : MbbrController::kScheduled;
-  for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
-    if (a.fidelity == kFidelityNames[i]) a.options.fidelity = static_cast<Fidelity>(i);
-  }
+  complete<Firmware>(a.choice);
+  const typename Firmware::Loaded loaded = Firmware::load(a.config, a.set);
   if (a.log.empty()) a.log = default_log(a);
 
   runtime::TelemetryOptions telemetry_options;
@@ -142,24 +136,16 @@ int run(Arguments a) {
   telemetry_options.url = a.telemetry == "off" ? "" : a.telemetry;
   telemetry_options.wait_when_full = !a.realtime;
   if (a.realtime) telemetry_options.max_publish_hz = 2.0 * kTickHz;
-  telemetry_options.estimators.assign(kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end());
-  telemetry_options.run = {"mbbr",
-                           a.estimator,
-                           a.controller,
-                           a.fidelity,
-                           static_cast<std::int64_t>(a.options.seed),
-                           loaded.config.robot.r,
-                           EQUIPOISE_VERSION,
-                           loaded.sha256,
-                           loaded.toml};
+  telemetry_options.estimators = Firmware::estimators();
+  telemetry_options.run = run_info<Firmware>(loaded, a.choice, static_cast<std::int64_t>(a.options.seed));
   runtime::Telemetry telemetry(telemetry_options);
 
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   Pace pace(a.realtime, a.options.duration_s, stderr);
-  const SimSummary summary = simulate_mbbr(
-      loaded.config, a.options,
+  const SimSummary summary = simulate<Firmware>(
+      loaded.config, a.choice, a.options,
       [&](const runtime::TickRecord& record) {
         telemetry.hand_over(record);
         if (telemetry.log_failed()) interrupted.store(true);  // nothing flies unrecorded
@@ -170,14 +156,19 @@ int run(Arguments a) {
   const runtime::TelemetryReport report = telemetry.finish();
   if (!report.warning.empty()) std::fprintf(stderr, "equipoise: warning: %s\n", report.warning.c_str());
 
-  print_summary(out, a, summary);
+  print_summary<Firmware>(out, a, summary);
   std::fprintf(out, "  log             %s\n", a.log.c_str());
-  if (!a.json.empty()) write_json(to_json(a, summary, loaded.sha256), a.json);
+  if (!a.json.empty()) write_json(to_json<Firmware>(a, summary, loaded.sha256), a.json);
   if (!report.log_error.empty()) {
     std::fprintf(stderr, "equipoise: %s\n", report.log_error.c_str());
     return 1;
   }
   return summary.fell ? 1 : 0;
+}
+
+int run(const Arguments& a) {
+  return with_robot(robot_type(a.config), a.config,
+                    [&](auto firmware) { return run<decltype(firmware)>(a); });
 }
 
 }  // namespace
@@ -186,33 +177,35 @@ void add_sim(CLI::App& app, int* status) {
   auto* command = app.add_subcommand("sim", "Simulates the robot through the production pipeline");
   auto a = std::make_shared<Arguments>();
   command->add_option("--config", a->config, "robot configuration, TOML")->required();
-  command->add_option("--yaw-hz", a->options.yaw_hz, "yaw rate, turns per second")
-      ->check(CLI::Range(-5.0, 5.0));
+  auto* yaw_hz = command->add_option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second");
+  yaw_hz->check(CLI::Range(-5.0, 5.0));
+  command->add_option("--yaw-rad-s", a->options.yaw_rate_rad_s, "yaw rate, rad/s")
+      ->check(CLI::Range(-10.0 * kPi, 10.0 * kPi))
+      ->excludes(yaw_hz);
   command->add_option("--drive-mps", a->options.drive_mps, "drive speed, m/s")->check(CLI::Range(-2.0, 2.0));
   command->add_option("--duration-s", a->options.duration_s, "simulated time, s")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 360000.0));
   command->add_option("--seed", a->options.seed, "seed of every random number")->capture_default_str();
-  command->add_option("--estimator", a->estimator, "ekf, ekf13_published, ekf13, kf_attitude, truth")
-      ->capture_default_str()
-      ->check(
-          CLI::IsMember(std::vector<std::string>(kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end())));
-  command->add_option("--controller", a->controller, "thesis, scheduled")
-      ->capture_default_str()
-      ->check(CLI::IsMember(kMbbrControllerNames));
-  command->add_option("--fidelity", a->fidelity, "ideal, thesis, full")
+  command->add_option("--estimator", a->choice.estimator, "which estimator controls: " + known_estimators());
+  command->add_option("--controller", a->choice.controller, known_controllers());
+  a->choice.fidelity = "full";
+  command->add_option("--fidelity", a->choice.fidelity, "ideal, thesis, full")
       ->capture_default_str()
       ->check(CLI::IsMember(kFidelityNames));
   command->add_option("--attitude", a->attitude, "attitude source: dmp")
       ->capture_default_str()
       ->check(CLI::IsMember({"dmp"}));
   command->add_option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
-  command->add_flag("--compare", a->options.compare, "run every estimator on the same samples");
+  command->add_flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command->add_option("--log", a->log, "LCM event log (default: logs/sim-...)");
   command->add_option("--json", a->json, "summary as JSON, - for stdout");
   command->add_flag("--realtime", a->realtime, "pace to wall-clock time");
   command->add_option("--telemetry", a->telemetry, "LCM provider URL, or off")->capture_default_str();
-  command->callback([=] { *status = run(*a); });
+  command->callback([=] {
+    if (*yaw_hz) a->options.yaw_rate_rad_s = 2.0 * kPi * a->yaw_hz;
+    *status = run(*a);
+  });
 }
 
 }  // namespace equipoise::app

@@ -36,6 +36,7 @@ class MbbrEstimators {
   using Id = MbbrEstimatorId;
   using Params = MbbrEstimatorParams;
   static constexpr std::size_t kCount = kMbbrEstimatorNames.size();
+  static constexpr const auto& kNames = kMbbrEstimatorNames;
 
   explicit MbbrEstimators(const Params& params);
 

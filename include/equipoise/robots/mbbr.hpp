@@ -100,4 +100,11 @@ inline StateView view(const MbbrEstimate& x, const MbbrParameters& p) noexcept {
   return v;
 }
 
+/// Attitude: roll and pitch. Speed: inertial velocity of the ball, m/s, [T] section 6.4.
+inline StateErrors errors(const MbbrEstimate& x, const MbbrEstimate& truth,
+                          const MbbrParameters& p) noexcept {
+  const Vec2 v = rotate(x.theta_z, x.phi_dot_star) - rotate(truth.theta_z, truth.phi_dot_star);
+  return {(x.theta_xy - truth.theta_xy).squaredNorm(), p.r * p.r * v.squaredNorm(), 2};
+}
+
 }  // namespace equipoise

@@ -1,0 +1,96 @@
+// The figures of one simulated run, for any robot.
+// In: every tick's estimates, truth, reference and motors -> out: SimSummary. Errors are against the plant's
+// truth and count from kSettled_s on. Simulation only.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "equipoise/actuate/safety.hpp"
+#include "equipoise/samples.hpp"
+
+namespace equipoise::app {
+
+/// When the drive starts, s; before it the robot balances in place. Motors are requested at kArmAt.
+inline constexpr double kArmAt_s = 0.5;
+inline constexpr double kDriveFrom_s = 1.0;
+/// Errors count from here on.
+inline constexpr double kSettled_s = 5.0;
+
+struct EstimatorErrors {
+  double attitude_rmse_rad = 0.0;
+  double speed_rmse = 0.0;  // m/s of the ball, or rad/s of the wheels
+};
+
+struct SimSummary {
+  bool fell = false;
+  double fell_at_s = -1.0;
+  EstimatorErrors controlling;
+  double position_rmse_m = 0.0;
+  double yaw_rate_mean_hz = 0.0;
+  double duty_max = 0.0;
+  double saturated_fraction = 0.0;
+  std::int64_t ticks = 0;
+  double real_time_factor = 0.0;
+  std::uint32_t reasons = 0;  // why the motors went off, if they did
+  bool interrupted = false;
+  std::map<std::string, EstimatorErrors> estimators;
+};
+
+class RunMeter {
+ public:
+  explicit RunMeter(std::size_t estimators) : compared_(estimators) {}
+
+  static bool settled(double time_s) noexcept { return time_s >= kSettled_s; }
+  void motors(const MotorCommand& motors, bool saturated);
+  void controlling(const StateErrors& e) { controlling_.add(e); }
+  void compared(std::size_t i, const StateErrors& e) { compared_[i].add(e); }
+  void path(double time_s, const StateView& reference, const StateView& truth);
+
+  /// False once the robot has fallen, or its motors went off.
+  bool upright(double time_s, ArmState arm, std::uint32_t reasons, const StateView& truth);
+
+  SimSummary summary(std::int64_t ticks, double wall_s) const;
+  EstimatorErrors compared_errors(std::size_t i) const { return compared_[i].value(); }
+
+ private:
+  class Rms {
+   public:
+    void add(double squared, int axes) {
+      sum_ += squared;
+      count_ += axes;
+    }
+    double value() const;
+
+   private:
+    double sum_ = 0.0;
+    std::int64_t count_ = 0;
+  };
+  class Errors {
+   public:
+    void add(const StateErrors& e) {
+      attitude_.add(e.attitude_squared, e.axes);
+      speed_.add(e.speed_squared, e.axes);
+    }
+    EstimatorErrors value() const { return {attitude_.value(), speed_.value()}; }
+
+   private:
+    Rms attitude_, speed_;
+  };
+
+  Errors controlling_;
+  std::vector<Errors> compared_;
+  Rms position_;
+  double yaw_from_ = 0.0;
+  double yaw_from_s_ = -1.0;
+  double yaw_to_ = 0.0;
+  double yaw_to_s_ = 0.0;
+  double duty_max_ = 0.0;
+  std::int64_t saturated_ = 0;
+  std::int64_t driven_ = 0;
+  double fell_at_s_ = -1.0;
+  std::uint32_t reasons_ = 0;
+};
+
+}  // namespace equipoise::app
