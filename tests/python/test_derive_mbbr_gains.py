@@ -136,5 +136,5 @@ def test_exact_robot_holds_while_spinning_and_driving():
 
 
 def test_simulation_tells_a_fall():
-    (outcome,) = simulate([Scenario(3.0, coulomb_N_m=COULOMB, delay_ticks=15)], duration_s=2.0)
+    (outcome,) = simulate([Scenario(3.0, coulomb_N_m=COULOMB, delay_ticks=15)], duration_s=1.0)
     assert not outcome.held

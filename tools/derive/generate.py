@@ -12,14 +12,15 @@ import re
 import sys
 from pathlib import Path
 
-from . import mbbr_gains, mbbr_header, mip_header
+from . import mbbr_gains, mbbr_header, mip_gains, mip_header
 
 TARGETS = {
     "mbbr_model.hpp": mbbr_header.render,
     "mbbr_gains.hpp": mbbr_gains.render,
     "mip_model.hpp": mip_header.render,
+    "mip_gains.hpp": mip_gains.render,
 }
-REPORTS = [mbbr_gains.report]
+REPORTS = [mbbr_gains.report, mip_gains.report]
 DEFAULT_FOLDER = Path(__file__).resolve().parents[2] / "config" / "generated"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:e[-+]?\d+)?(?!\w)")
 # Gains come out of an iterative solver; linear algebra libraries differ in the last digits.

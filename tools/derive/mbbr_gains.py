@@ -86,13 +86,13 @@ def report() -> list[str]:
     return lines
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     text = f"{value + 0.0:.8g}"  # + 0.0: no negative zero
     return text if "." in text or "e" in text else text + ".0"
 
 
 def _pair(value: complex) -> str:
-    return f"{{{_number(value.real)}, {_number(value.imag if abs(value.imag) > 1e-12 else 0.0)}}}"
+    return f"{{{number(value.real)}, {number(value.imag if abs(value.imag) > 1e-12 else 0.0)}}}"
 
 
 def render() -> str:
@@ -121,19 +121,19 @@ def render() -> str:
         "inline constexpr std::array<Row, kRows> kScheduled{{",
     ]
     for row in d.rows:
-        body.append(f"    {{{_number(row.yaw_rate)}, {', '.join(map(_pair, row.gains))}}},")
+        body.append(f"    {{{number(row.yaw_rate)}, {', '.join(map(_pair, row.gains))}}},")
     body += [
         "}};",
         "",
-        f"inline constexpr double kSpeed = {_number(r.speed)};  // (k2_ball + mu_v) / k1",
-        f"inline constexpr double kSpeedTurn = {_number(r.speed_turn)};  // I_w / k1",
-        f"inline constexpr double kLean = {_number(r.lean)};  // (B + C) / G of docs/derivation.md",
-        f"inline constexpr double kDrive = {_number(r.drive)};  // B / k1",
+        f"inline constexpr double kSpeed = {number(r.speed)};  // (k2_ball + mu_v) / k1",
+        f"inline constexpr double kSpeedTurn = {number(r.speed_turn)};  // I_w / k1",
+        f"inline constexpr double kLean = {number(r.lean)};  // (B + C) / G of docs/derivation.md",
+        f"inline constexpr double kDrive = {number(r.drive)};  // B / k1",
         "",
         "/// u_z = kYawAngle d_theta_z + kYawRate d_theta_z_dot + kYawFeedforward ref_theta_z_dot.",
-        f"inline constexpr double kYawAngle = {_number(d.yaw_gains[0])};",
-        f"inline constexpr double kYawRate = {_number(d.yaw_gains[1])};",
-        f"inline constexpr double kYawFeedforward = {_number(d.yaw_feedforward)};",
+        f"inline constexpr double kYawAngle = {number(d.yaw_gains[0])};",
+        f"inline constexpr double kYawRate = {number(d.yaw_gains[1])};",
+        f"inline constexpr double kYawFeedforward = {number(d.yaw_feedforward)};",
         "",
     ]
     about = [

@@ -1,0 +1,239 @@
+"""The MIP's controllers at 200 Hz: successive loop closure and LQR -> config/generated/mip_gains.hpp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy import signal
+
+from . import emit, lqr, mip, mip_header
+from .mbbr_gains import number, weights
+
+INPUTS = (
+    "kane.py",
+    "mip.py",
+    "model_header.py",
+    "mip_header.py",
+    "emit.py",
+    "lqr.py",
+    "mip_gains.py",
+    "weights.toml",
+)
+YAW_RATES = (0.0, 5.0, 10.0)  # rad/s: the dissertation's experiments, [T] Table 3.3
+
+
+@dataclass(frozen=True)
+class Slc:
+    """u = D1 (theta_ref - theta), theta_ref = D2 (phi_ref - phi), u_z = Dz; [T] (3.50)-(3.52)."""
+
+    rate_hz: float
+    D1: tuple  # (numerator, denominator) in descending powers of z
+    D2: tuple
+    yaw: tuple  # per psi error, per psi' error
+
+
+# The coefficients the robot's own library was published with, for 100 Hz. [T] (3.50)-(3.51) print them with
+# three digits and D2's sign reversed, and are unstable so (docs/derivation.md).
+PUBLISHED = Slc(
+    100.0,
+    ((-4.945, 8.862, -3.967), (1.0, -1.481, 0.4812)),
+    ((0.18856, -0.37209, 0.18354), (1.0, -1.86046, 0.86046)),
+    (1.0, 0.05),
+)
+AS_PRINTED = Slc(
+    200.0,
+    ((-4.95, 8.86, -3.97), (1.0, -1.48, 0.481)),
+    ((-0.189, 0.372, -0.184), (1.0, -1.86, 0.86)),
+    (1.0, 0.05),
+)
+
+
+@lru_cache(maxsize=4)
+def _coefficients(lateral: float = 0.0) -> dict:
+    return mip_header.model().numbers(mip.TABLE_3_2 | {"lateral": lateral})
+
+
+def planar_system(yaw_rate: float = 0.0, lateral: float = 0.0):
+    """(A, b) of (theta, phi, theta', phi') and u_x, about upright at a constant yaw rate."""
+    c = _coefficients(lateral)
+    A, b = np.zeros((4, 4)), np.zeros((4, 1))
+    A[:2, 2:] = np.eye(2)
+    for i, row in enumerate(("theta_ddot", "phi_ddot")):
+        A[2 + i, 0] = c[f"{row}_th"] + c[f"{row}_th_dps2"] * yaw_rate**2
+        A[2 + i, 3] = c[f"{row}_dph"]
+        b[2 + i, 0] = c[f"{row}_ux"]
+    return A, b
+
+
+def yaw_system():
+    """(A, b) of (psi, psi') and u_z."""
+    c = _coefficients()
+    return np.array([[0.0, 1.0], [0.0, c["psi_ddot_dps"]]]), np.array([[0.0], [c["psi_ddot_uz"]]])
+
+
+def slc_loop(slc: Slc, A, b):
+    """Plant and controller as one loop, broken at u: (A, b, K), u = -K x."""
+    A1, B1, C1, d1 = signal.tf2ss(*slc.D1)
+    A2, B2, C2, d2 = signal.tf2ss(*slc.D2)
+    n = len(A)
+    theta, phi = np.eye(1, n + 4, 0), np.eye(1, n + 4, 1)
+    in_1, in_2 = slice(n, n + 2), slice(n + 2, n + 4)
+    theta_ref = -d2 * phi
+    theta_ref[:, in_2] += C2
+    error = theta_ref - theta
+    u = d1 * error
+    u[:, in_1] += C1
+    whole = np.zeros((n + 4, n + 4))
+    whole[:n, :n] = A
+    whole[in_1] = B1 @ error
+    whole[in_1, in_1] += A1
+    whole[in_2] = -B2 @ phi
+    whole[in_2, in_2] += A2
+    return whole, np.vstack([b, np.zeros((4, 1))]), -u
+
+
+def slc_pole(slc: Slc, rate_hz: float) -> float:
+    """Largest closed-loop pole of the same coefficients run at some rate."""
+    return lqr.largest_pole(*slc_loop(slc, *lqr.sampled(*planar_system(), 1 / rate_hz)))
+
+
+@lru_cache(maxsize=1)
+def slc_design() -> Slc:
+    """Corner frequencies of weights.toml, discretised by Tustin's rule."""
+    w, dt = weights()["mip"]["slc"], weights()["tick_s"]
+    D1 = (
+        -w["gain"] * np.polymul([1, w["integral_rad_s"]], [1 / w["lead_rad_s"], 1]),
+        np.polymul([1, 0], [1 / w["roll_off_rad_s"], 1]),
+    )
+    D2 = (
+        w["outer_gain"] * np.array([1 / w["outer_zero_rad_s"], 1]),
+        np.polymul([1 / w["outer_pole_rad_s"], 1], [1 / w["outer_roll_off_rad_s"], 1]),
+    )
+    discrete = [signal.cont2discrete(d, dt, method="bilinear")[:2] for d in (D1, D2)]
+    return Slc(1 / dt, *[(tuple(np.ravel(n)), tuple(np.ravel(d))) for n, d in discrete], yaw_gains())
+
+
+def lqr_gains() -> np.ndarray:
+    """u_x = gains (reference - estimate) of theta, phi, theta', phi'."""
+    w = weights()["mip"]["lqr"]
+    A, b = lqr.sampled(*planar_system(), weights()["tick_s"])
+    deviations = [w["theta_rad"], w["phi_rad"], w["theta_dot_rad_s"], w["phi_dot_rad_s"]]
+    return lqr.lqr(A, b, [d**-2 for d in deviations], [w["u_x"] ** -2])[0]
+
+
+def yaw_gains() -> tuple:
+    w = weights()["mip"]["yaw"]
+    A, b = lqr.sampled(*yaw_system(), weights()["tick_s"])
+    return tuple(lqr.lqr(A, b, [w["psi_rad"] ** -2, w["psi_dot_rad_s"] ** -2], [w["u_z"] ** -2])[0])
+
+
+def margins(controller: str, yaw_rate: float, lateral: float = 0.0, late_ticks: int = 1) -> lqr.Margins:
+    """At u, with the input already `late_ticks` late; controller: slc, published, lqr."""
+    rate = PUBLISHED.rate_hz if controller == "published" else 1 / weights()["tick_s"]
+    A, b = lqr.sampled(*planar_system(yaw_rate, lateral), 1 / rate)
+    if controller == "lqr":
+        loop = (A, b, lqr_gains().reshape(1, 4))
+    else:
+        loop = slc_loop(PUBLISHED if controller == "published" else slc_design(), A, b)
+    return lqr.margins(*lqr.delayed(*loop, late_ticks))
+
+
+def speed_feedforward() -> float:
+    """u_x per rad/s of phi' against back-EMF."""
+    return mip.TABLE_3_2["k2"] / mip.TABLE_3_2["k1"]
+
+
+def yaw_feedforward() -> float:
+    """u_z per rad/s of psi' against back-EMF."""
+    A, b = yaw_system()
+    return float(-A[1, 1] / b[1, 0])
+
+
+def report() -> list[str]:
+    lines = [
+        "MIP, largest closed-loop poles of the published coefficients:",
+        f"  run at 200 Hz {slc_pole(PUBLISHED, 200):.4f}, at 100 Hz {slc_pole(PUBLISHED, 100):.4f}; "
+        f"as printed in [T], at 200 Hz {slc_pole(AS_PRINTED, 200):.4f}",
+        "MIP, margins at u with the input one tick late:",
+    ]
+    for controller in ("published", "slc", "lqr"):
+        for yaw_rate in YAW_RATES:
+            lines.append(f"  {controller:9s} {yaw_rate:4.1f} rad/s  {margins(controller, yaw_rate)}")
+    A, b = lqr.sampled(*yaw_system(), weights()["tick_s"])
+    yaw = lqr.margins(*lqr.delayed(A, b, np.array([yaw_gains()]), 1))
+    lines.append(f"  yaw                  {yaw}")
+    lines.append("  LQR theta, phi, theta', phi': " + " ".join(f"{g:.3g}" for g in lqr_gains()))
+    return lines
+
+
+def _second_order(tf) -> str:
+    top, bottom = tf
+    return "{" + ", ".join(number(v) for v in (*top, *bottom[1:])) + "}"
+
+
+def _slc(name: str, slc: Slc, comment: str) -> list[str]:
+    return [
+        f"/// {comment}",
+        f"inline constexpr Slc {name}{{",
+        f"    {number(slc.rate_hz)},",
+        f"    {_second_order(slc.D1)},",
+        f"    {_second_order(slc.D2)},",
+        f"    {number(slc.yaw[0])},",
+        f"    {number(slc.yaw[1])}}};",
+    ]
+
+
+def render() -> str:
+    gains, yaw = lqr_gains(), yaw_gains()
+    body = [
+        "/// out = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) in.",
+        "struct SecondOrder {",
+        "  double b0;",
+        "  double b1;",
+        "  double b2;",
+        "  double a1;",
+        "  double a2;",
+        "};",
+        "",
+        "/// u_x = D1 (theta_ref - theta), theta_ref = D2 (phi_ref - phi), [T] (3.50)-(3.51);",
+        "/// u_z = yaw_angle (psi_ref - psi) + yaw_rate (psi_ref' - psi') + kYawFeedforward psi_ref'.",
+        "struct Slc {",
+        "  double rate_hz;",
+        "  SecondOrder D1;",
+        "  SecondOrder D2;",
+        "  double yaw_angle;",
+        "  double yaw_rate;",
+        "};",
+        "",
+        "/// u_x = sum gain (reference - estimate) + kSpeed phi_ref'; u_z as above.",
+        "struct Lqr {",
+        "  double theta;",
+        "  double phi;",
+        "  double theta_dot;",
+        "  double phi_dot;",
+        "  double yaw_angle;",
+        "  double yaw_rate;",
+        "};",
+        "",
+        *_slc("kSlc", slc_design(), "Designed here, for 200 Hz."),
+        "",
+        *_slc("kSlcPublished", PUBLISHED, "As published with the robot's library, for 100 Hz."),
+        "",
+        f"inline constexpr Lqr kLqr{{{', '.join(number(g) for g in gains[:3])},",
+        f"                          {', '.join(number(g) for g in (gains[3], *yaw))}}};",
+        "",
+        "// Against back-EMF.",
+        f"inline constexpr double kSpeed = {number(speed_feedforward())};  // k2 / k1",
+        f"inline constexpr double kYawFeedforward = {number(yaw_feedforward())};  // d k2 / (2 r k1)",
+        "",
+    ]
+    about = [
+        "Controllers of the MIP: successive loop closure (SLC) and LQR, with yaw PD. phi: encoder angle.",
+        "In: reference minus estimate -> out: u_x, u_z. 200 Hz unless named. RT-safe.",
+        "Design and weights: tools/derive/mip_gains.py, weights.toml; docs/derivation.md.",
+    ]
+    extra = repr(sorted(mip.TABLE_3_2.items()))
+    inputs = emit.input_hash(*INPUTS, extra=extra)
+    return emit.header(about, "mip_gains.py", inputs, "equipoise::generated::mip", body, includes=())
