@@ -9,10 +9,7 @@ nlohmann::json evaluate_mbbr(const MbbrDynamics& dynamics, const nlohmann::json&
   const Vec2 theta_xy = vector_at<2>(row, "theta_xy");
   const Vec3 theta_dot = vector_at<3>(row, "theta_dot");
   const Vec3 tau_B = vector_at<3>(row, "tau_B");
-  MbbrMotion m;
-  m.theta_xy = theta_xy;
-  m.omega_B = body_rates(theta_xy, theta_dot);
-  m.phi_dot_star = vector_at<2>(row, "phi_star_dot");
+  const MbbrMotion m(theta_xy, body_rates(theta_xy, theta_dot), vector_at<2>(row, "phi_star_dot"));
   const MbbrAccelerations a = dynamics.accelerations(m, tau_B);
   Vec<5> qdd;
   qdd << MbbrDynamics::theta_ddot(m, a), MbbrDynamics::phi_star_ddot(m, a);

@@ -6,17 +6,19 @@ namespace equipoise {
 namespace {
 
 /// R of the tilt alone, yaw frame <- body: Ry(theta_y) Rx(theta_x).
-Mat3 tilt_rotation(const Vec2& theta_xy) noexcept {
-  const double sx = std::sin(theta_xy.x());
-  const double cx = std::cos(theta_xy.x());
-  const double sy = std::sin(theta_xy.y());
-  const double cy = std::cos(theta_xy.y());
+Mat3 tilt_rotation(const MbbrMotion& m) noexcept {
   Mat3 R;
-  R << cy, sy * sx, sy * cx, 0.0, cx, -sx, -sy, cy * sx, cy * cx;
+  R << m.cy(), m.sy() * m.sx(), m.sy() * m.cx(), 0.0, m.cx(), -m.sx(), -m.sy(), m.cy() * m.sx(),
+      m.cy() * m.cx();
   return R;
 }
 
 }  // namespace
+
+Vec3 MbbrMotion::theta_dot() const noexcept {
+  const double z = (sx_ * omega_B.y() + cx_ * omega_B.z()) / cy_;
+  return {omega_B.x() + sy_ * z, cx_ * omega_B.y() - sx_ * omega_B.z(), z};
+}
 
 MbbrDynamics::MbbrDynamics(const MbbrParameters& p) noexcept
     : p_(p),
@@ -28,7 +30,7 @@ MbbrDynamics::MbbrDynamics(const MbbrParameters& p) noexcept
 //   diag(body_inertia) Omega' + C alpha = b_body,   C^T Omega' + ball_inertia alpha = b_ball.
 MbbrAccelerations MbbrDynamics::accelerations(const MbbrMotion& m, const Vec3& tau_B,
                                               const Vec3& push_B) const noexcept {
-  const Mat3 R = tilt_rotation(m.theta_xy);
+  const Mat3 R = tilt_rotation(m);
   const Vec3& w = m.omega_B;
   const double ml = p_.m_t * p_.l;
 
@@ -66,12 +68,12 @@ MbbrAccelerations MbbrDynamics::accelerations(const MbbrMotion& m, const Vec3& t
 }
 
 Vec3 MbbrDynamics::encoder_rate_B(const MbbrMotion& m) noexcept {
-  const Mat3 R = tilt_rotation(m.theta_xy);
+  const Mat3 R = tilt_rotation(m);
   return R.transpose().leftCols<2>() * m.phi_dot_star - m.omega_B;
 }
 
 Vec3 MbbrDynamics::accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
-  const Mat3 R = tilt_rotation(m.theta_xy);
+  const Mat3 R = tilt_rotation(m);
   const Vec2 ball = ball_velocity(p_.r, a.phi_ddot_inertial);
   const Vec3 gravity_minus_ball(-ball.x(), -ball.y(), -kGravity_m_s2);
   return R.transpose() * gravity_minus_ball - a.omega_dot_B.cross(p_.l_a) -
@@ -79,20 +81,17 @@ Vec3 MbbrDynamics::accelerometer_B(const MbbrMotion& m, const MbbrAccelerations&
 }
 
 Vec2 MbbrDynamics::phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept {
-  const double yaw_rate = euler_rates(m.theta_xy, m.omega_B).z();
+  const double yaw_rate = m.theta_dot().z();
   return a.phi_ddot_inertial + yaw_rate * Vec2(m.phi_dot_star.y(), -m.phi_dot_star.x());
 }
 
 Vec3 MbbrDynamics::theta_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept {
-  const double sx = std::sin(m.theta_xy.x());
-  const double cx = std::cos(m.theta_xy.x());
-  const double sy = std::sin(m.theta_xy.y());
-  const double cy = std::cos(m.theta_xy.y());
-  const Vec3 rate = euler_rates(m.theta_xy, m.omega_B);
+  const Vec3 rate = m.theta_dot();
   const Vec3& w_dot = a.omega_dot_B;
-  const double y = cx * w_dot.y() - sx * w_dot.z() - rate.x() * rate.z() * cy;
-  const double z = (sx * w_dot.y() + cx * w_dot.z() + rate.x() * rate.y() + rate.y() * rate.z() * sy) / cy;
-  return {w_dot.x() + cy * rate.y() * rate.z() + sy * z, y, z};
+  const double y = m.cx() * w_dot.y() - m.sx() * w_dot.z() - rate.x() * rate.z() * m.cy();
+  const double z =
+      (m.sx() * w_dot.y() + m.cx() * w_dot.z() + rate.x() * rate.y() + rate.y() * rate.z() * m.sy()) / m.cy();
+  return {w_dot.x() + m.cy() * rate.y() * rate.z() + m.sy() * z, y, z};
 }
 
 Vec3 MbbrDynamics::relative_mobility() const noexcept {

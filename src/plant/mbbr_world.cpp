@@ -42,11 +42,7 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
 }
 
 MbbrMotion MbbrWorld::motion(const State& s) noexcept {
-  MbbrMotion m;
-  m.theta_xy = s.segment<2>(kTheta);
-  m.omega_B = s.segment<3>(kOmega);
-  m.phi_dot_star = s.segment<2>(kPhiDot);
-  return m;
+  return {s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot)};
 }
 
 Vec3 MbbrWorld::motor_torque_B(const Vec3& relative_rate_B) const noexcept {
@@ -81,7 +77,7 @@ MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B,
   }
   const MbbrAccelerations a = dynamics_.accelerations(m, tau, push_B);
   State d;
-  d.segment<3>(kTheta) = euler_rates(m.theta_xy, m.omega_B);
+  d.segment<3>(kTheta) = m.theta_dot();
   d.segment<3>(kOmega) = a.omega_dot_B;
   d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, a);
   d.segment<2>(kPhi) = rotate(theta_z, m.phi_dot_star);
@@ -93,13 +89,8 @@ MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B,
 /// one rule.
 Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept {
   if (!world_.friction) return Vec3::Zero();
-  const MbbrMotion m = motion(s);
-  const State d = derivative(s, Vec3::Zero(), push_W);
-  MbbrMotion next = m;
-  next.theta_xy += world_.step_s * d.segment<2>(kTheta);
-  next.omega_B += world_.step_s * d.segment<3>(kOmega);
-  next.phi_dot_star += world_.step_s * d.segment<2>(kPhiDot);
-  const Vec3 free = MbbrDynamics::encoder_rate_B(next);
+  const State next = s + world_.step_s * derivative(s, Vec3::Zero(), push_W);
+  const Vec3 free = MbbrDynamics::encoder_rate_B(motion(next));
   Vec3 tau;
   for (int i = 0; i < 3; ++i) {
     tau(i) = std::clamp(-free(i) / (world_.step_s * mobility_(i)), -robot_.mu_c, robot_.mu_c);
@@ -135,7 +126,7 @@ void MbbrWorld::disturb() {
   Vec<10> v;
   for (int i = 0; i < 10; ++i) v(i) = process_noise_.gaussian(world_.process_noise_sigma(i));
   const MbbrMotion before = motion(s_);
-  Vec3 theta_dot = euler_rates(before.theta_xy, before.omega_B);
+  Vec3 theta_dot = before.theta_dot();
   s_.segment<3>(kTheta) += v.head<3>();
   theta_dot += v.segment<3>(5);
   s_.segment<3>(kOmega) = body_rates(s_.segment<2>(kTheta), theta_dot);

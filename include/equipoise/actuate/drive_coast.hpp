@@ -10,6 +10,23 @@ namespace equipoise {
 /// i_avg/i_s for command u. [T] (4.28)-(4.30).
 double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept;
 
+/// The same for a command that is held while the speed changes: what depends on the command alone, computed
+/// once.
+class DriveCoastCommand {
+ public:
+  DriveCoastCommand() = default;
+  DriveCoastCommand(double T_r, double u) noexcept;
+  double mean_current(double omega_r) const noexcept;
+
+ private:
+  double T_r_ = 0.0;
+  double sign_ = 1.0;
+  double v_ = 0.0;
+  double drained_ = 0.0;     // 1 - exp(-v T_r)
+  double off_decay_ = 0.0;   // 1 - exp(-(1 - v) T_r)
+  double full_decay_ = 0.0;  // 1 - exp(-T_r)
+};
+
 struct DriveCoastSolution {
   double u = 0.0;         // command, -1 .. 1
   int iterations = 0;     // of the scalar solver, at most kDriveCoastMaxIterations

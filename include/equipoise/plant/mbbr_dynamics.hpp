@@ -8,10 +8,33 @@
 
 namespace equipoise {
 
-struct MbbrMotion {
-  Vec2 theta_xy = Vec2::Zero();
-  Vec3 omega_B = Vec3::Zero();
-  Vec2 phi_dot_star = Vec2::Zero();
+/// Tilt with its sines and cosines, which every function below needs: computed once per evaluation.
+class MbbrMotion {
+ public:
+  MbbrMotion() = default;
+  MbbrMotion(const Vec2& theta_xy, const Vec3& omega, const Vec2& phi_dot) noexcept
+      : omega_B(omega),
+        phi_dot_star(phi_dot),
+        theta_xy_(theta_xy),
+        sx_(std::sin(theta_xy.x())),
+        cx_(std::cos(theta_xy.x())),
+        sy_(std::sin(theta_xy.y())),
+        cy_(std::cos(theta_xy.y())) {}
+
+  const Vec2& theta_xy() const noexcept { return theta_xy_; }
+  double sx() const noexcept { return sx_; }
+  double cx() const noexcept { return cx_; }
+  double sy() const noexcept { return sy_; }
+  double cy() const noexcept { return cy_; }
+  /// Euler angle rates, [T] (A.13) inverted.
+  Vec3 theta_dot() const noexcept;
+
+  Vec3 omega_B = Vec3::Zero();       // body rates
+  Vec2 phi_dot_star = Vec2::Zero();  // ball rates, yaw frame
+
+ private:
+  Vec2 theta_xy_ = Vec2::Zero();
+  double sx_ = 0.0, cx_ = 1.0, sy_ = 0.0, cy_ = 1.0;
 };
 
 struct MbbrAccelerations {

@@ -96,6 +96,12 @@ TEST(DriveCoast, LimitsOfVeryHighAndVeryLowPwmFrequency) {
   EXPECT_NEAR(drive_coast_invert(1e9, 0.3, -0.2).u, -0.2 / (1.0 + 0.3), 1e-8);
 }
 
+TEST(DriveCoast, BackwardsAtNoLoadSpeedIsAlwaysContinuous) {
+  for (const double T_r : {0.289, 600.0, 1e6}) {
+    EXPECT_DOUBLE_EQ(drive_coast_mean_current(T_r, -1.0, 0.3), 0.6);  // (4.29) with omega_s = -1
+  }
+}
+
 TEST(DriveCoast, UnreachableTargetsClampAndSaySo) {
   const DriveCoastSolution more = drive_coast_invert(0.289, 0.5, 0.6);  // at most 1 - 0.5
   EXPECT_EQ(more.u, 1.0);

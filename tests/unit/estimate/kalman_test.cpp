@@ -99,10 +99,7 @@ TEST(MbbrModels, CorrectedModelIsTheExactDynamicsForSmallTilt) {
     x << small * unit(random), small * unit(random), 0, 0, 0, small * unit(random), small * unit(random),
         6.0 * unit(random), 6.0 * unit(random), 6.0 * unit(random);
     const Vec3 u(unit(random), unit(random), unit(random));
-    MbbrMotion m;
-    m.theta_xy = x.head<2>();
-    m.omega_B = body_rates(m.theta_xy, x.segment<3>(5));
-    m.phi_dot_star = x.tail<2>();
+    const MbbrMotion m(x.head<2>(), body_rates(x.head<2>(), x.segment<3>(5)), x.tail<2>());
     const Vec3 tau = p.k1 * u - (p.k2_ball + p.mu_v) * MbbrDynamics::encoder_rate_B(m);
     const MbbrAccelerations a = exact.accelerations(m, tau);
     Vec<10> next;

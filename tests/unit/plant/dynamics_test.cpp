@@ -16,10 +16,9 @@ TEST(MbbrDynamics, MatchesTheIndependentDerivation) {
   const auto rows = oracle_rows("mbbr_dynamics");
   ASSERT_EQ(rows.size(), 200U);
   for (const auto& row : rows) {
-    MbbrMotion m;
-    m.theta_xy = vector_of<2>(row, "theta_xy");
-    m.omega_B = body_rates(m.theta_xy, vector_of<3>(row, "theta_dot"));
-    m.phi_dot_star = vector_of<2>(row, "phi_star_dot");
+    const Vec2 theta_xy = vector_of<2>(row, "theta_xy");
+    const MbbrMotion m(theta_xy, body_rates(theta_xy, vector_of<3>(row, "theta_dot")),
+                       vector_of<2>(row, "phi_star_dot"));
     const MbbrAccelerations a = dynamics.accelerations(m, vector_of<3>(row, "tau_B"));
     Vec<5> qdd;
     qdd << MbbrDynamics::theta_ddot(m, a), MbbrDynamics::phi_star_ddot(m, a);
@@ -45,18 +44,12 @@ TEST(MbbrDynamics, APushAtTheCentreOfMassMovesTheBodyWithIt) {
 TEST(MbbrDynamics, EnergyIsConservedWithoutTorqueAndPush) {
   const MbbrParameters p;
   const MbbrDynamics dynamics{p};
-  MbbrMotion m;
-  m.theta_xy = Vec2(0.05, -0.03);
-  m.omega_B = Vec3(0.2, 0.1, 5.0);
-  m.phi_dot_star = Vec2(3.0, -2.0);
+  MbbrMotion m(Vec2(0.05, -0.03), Vec3(0.2, 0.1, 5.0), Vec2(3.0, -2.0));
   const auto energy = [&](const MbbrMotion& s) {
     const Vec2 vb = ball_velocity(p.r, s.phi_dot_star);
-    const double sx = std::sin(s.theta_xy.x());
-    const double cx = std::cos(s.theta_xy.x());
-    const double sy = std::sin(s.theta_xy.y());
-    const double cy = std::cos(s.theta_xy.y());
     Mat3 R;
-    R << cy, sy * sx, sy * cx, 0, cx, -sx, -sy, cy * sx, cy * cx;
+    R << s.cy(), s.sy() * s.sx(), s.sy() * s.cx(), 0, s.cx(), -s.sx(), -s.sy(), s.cy() * s.sx(),
+        s.cy() * s.cx();
     const Vec3 v_com = Vec3(vb.x(), vb.y(), 0) + R * s.omega_B.cross(Vec3(0, 0, p.l));
     const Vec3 w = s.omega_B;
     const Vec3 wheel = MbbrDynamics::encoder_rate_B(s);
@@ -70,11 +63,8 @@ TEST(MbbrDynamics, EnergyIsConservedWithoutTorqueAndPush) {
   for (int i = 0; i < 10000; ++i) {  // midpoint rule, 0.1 s
     const auto step = [&](const MbbrMotion& at, const MbbrMotion& from, double dt) {
       const MbbrAccelerations a = dynamics.accelerations(at, Vec3::Zero());
-      MbbrMotion next = from;
-      next.theta_xy += dt * euler_rates(at.theta_xy, at.omega_B).head<2>();
-      next.omega_B += dt * a.omega_dot_B;
-      next.phi_dot_star += dt * MbbrDynamics::phi_star_ddot(at, a);
-      return next;
+      return MbbrMotion(from.theta_xy() + dt * at.theta_dot().head<2>(), from.omega_B + dt * a.omega_dot_B,
+                        from.phi_dot_star + dt * MbbrDynamics::phi_star_ddot(at, a));
     };
     m = step(step(m, m, 0.5 * h), m, h);
   }
