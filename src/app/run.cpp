@@ -86,6 +86,7 @@ class Runner {
     options.max_log_bytes = a_.log_max_mb * 1000000;
     options.min_free_bytes = a_.log_min_free_mb * 1000000;
     options.sync = a_.backend == "board";
+    options.wait_when_full = a_.backend != "board";  // an engine may run faster than the disk
     options.run = run_info<Firmware>(loaded_, a_.choice, 0);
     options.run.backend = a_.backend;
     options.run.board_toml = board_toml_;
