@@ -255,7 +255,8 @@ int run(Arguments a) {
       throw InputError("--estimator truth: only a simulation knows the truth");
     if (a.backend == "lockstep") return run_lockstep<Firmware>(a);
     const Board board = load_board(a.board);
-    if (board.robot != Firmware::kName) {
+    const bool wired_for_it = board.robot == Firmware::kName;
+    if (!wired_for_it) {
       throw InputError(a.board + ": board.robot: \"" + board.robot + "\" where " + a.config + " says \"" +
                        Firmware::kName + "\"");
     }

@@ -46,7 +46,7 @@ class LogWriter {
   void make_room();
   void next_file();
 
-  static constexpr int kFlushTicks = 10;  // 50 ms
+  static constexpr int kFlushTicks = 4;  // 20 ms
 
   std::string path_;
   LogLimits limits_;
