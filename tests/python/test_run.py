@@ -1,8 +1,11 @@
 """The simulator, its log and the report agree; tools/run leaves what it promises."""
 
 import json
+import os
 import shutil
+import signal
 import subprocess
+import time
 
 import pytest
 from equipoise_tools.log import read_log
@@ -116,6 +119,28 @@ def test_the_run_command_keeps_stdout_for_json(run_command):
     result, _ = run_command("--duration-s", "6", "--json", "-", "--yaw-hz=0.5")
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["yaw_hz"] == 0.5
+
+
+def test_an_interrupted_run_still_leaves_its_report(root, run_command):
+    logs = root / "logs"
+    before = set(logs.glob("*/run.lcm"))
+    command = [root / "tools/run", "--telemetry", "off", "--realtime", "--duration-s", "600"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    )
+
+    def flying():
+        return [log for log in set(logs.glob("*/run.lcm")) - before if log.stat().st_size > 0]
+
+    while process.poll() is None and not flying():
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # as the terminal does on Ctrl-C
+    out, err = process.communicate()
+    assert process.returncode == 0, err
+    assert b"report.html" in out
+    (log,) = flying()
+    assert json.loads((log.parent / "summary.json").read_text())["interrupted"]
+    assert (log.parent / "report.png").exists()
 
 
 @pytest.mark.parametrize(

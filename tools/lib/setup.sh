@@ -18,9 +18,12 @@ bad_usage() {
   exit 2
 }
 
-# Ctrl-C: the child got the signal too and is cleaning up; leave with the conventional code, without a trace.
-trap 'trap - INT TERM; say ""; say "interrupted"; exit 130' INT
-trap 'trap - INT TERM; say "terminated"; exit 143' TERM
+# Ctrl-C: the child got the signal too and has cleaned up by now; leave with the conventional code.
+leave_on_signals() {
+  trap 'trap - INT TERM; say ""; say "interrupted"; exit 130' INT
+  trap 'trap - INT TERM; say "terminated"; exit 143' TERM
+}
+leave_on_signals
 
 as_root() {
   if [ "$(id -u)" -eq 0 ]; then
