@@ -69,10 +69,18 @@ std::array<Bench::Channel, 4> Bench::pwm() const {
   return channels;
 }
 
+const std::string& Bench::simDirectory(const std::string& chip) const {
+  std::string& known = sim_directories_[chip];
+  if (known.empty()) {
+    const std::string config = "/sys/kernel/config/gpio-sim/" + chip;
+    known = "/sys/devices/platform/" + readLine(config + "/dev_name") + "/" +
+            readLine(config + "/bank/chip_name");
+  }
+  return known;
+}
+
 std::string Bench::simPath(const std::string& chip, unsigned line, const std::string& attribute) const {
-  const std::string config = "/sys/kernel/config/gpio-sim/" + chip;
-  return "/sys/devices/platform/" + readLine(config + "/dev_name") + "/" +
-         readLine(config + "/bank/chip_name") + "/sim_gpio" + std::to_string(line) + "/" + attribute;
+  return simDirectory(chip) + "/sim_gpio" + std::to_string(line) + "/" + attribute;
 }
 
 bool Bench::pin(const std::string& chip, unsigned line) const {
