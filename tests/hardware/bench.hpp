@@ -32,6 +32,7 @@ class Bench {
   void fault(const std::string& device, int error,
              uint32_t times);  // imu, pwm, counter, adc; UINT32_MAX: forever
   void unplug(const std::string& device);
+  void plug(const std::string& device);
   uint8_t imuRegister(uint8_t reg) const;
 
   static bbb_config_t mbbr();  // wired as config/boards/robotics_cape_mbbr.toml

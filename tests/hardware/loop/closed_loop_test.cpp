@@ -67,7 +67,10 @@ class ClosedLoop : public ::testing::Test {
   }
   // Until it stands by itself.
   void balance(int ticks) {
-    for (int i = 0; i < 20 * kTicksPerSecond && *ticks_ == 0; ++i) world_->tick();
+    while (*ticks_ == 0) {
+      ASSERT_EQ(waitpid(child_, nullptr, WNOHANG), 0) << "the firmware did not start";
+      world_->tick();
+    }
     for (int i = 0; i < ticks; ++i) {
       ASSERT_TRUE(world_->tick()) << "no answer in tick " << i;
       ASSERT_LT(world_->tilt_rad(), 0.5) << "fell in tick " << i;
