@@ -15,14 +15,23 @@ namespace {
 const std::string kDebug = "/sys/kernel/debug/robot_bench/";
 constexpr unsigned kDataReadyLine = 21;
 
-void writeBytes(const std::string& path, const void* data, size_t size) {
-  const int fd = open(path.c_str(), O_WRONLY | O_CLOEXEC);
-  const ssize_t n = fd < 0 ? -1 : write(fd, data, size);
-  if (n != static_cast<ssize_t>(size)) {
+// Kept open: under emulation, opening costs more than reading.
+int keptFd(const std::string& path, int flags) {
+  static std::map<std::string, int> fds;
+  const auto known = fds.find(path);
+  if (known != fds.end()) return known->second;
+  const int fd = open(path.c_str(), flags | O_CLOEXEC);
+  if (fd < 0) {
     std::perror(path.c_str());
     std::abort();  // the bench itself is broken: no test can say anything
   }
-  close(fd);
+  return fds[path] = fd;
+}
+
+void writeBytes(const std::string& path, const void* data, size_t size) {
+  if (write(keptFd(path, O_WRONLY), data, size) == static_cast<ssize_t>(size)) return;  // some cannot seek
+  std::perror(path.c_str());
+  std::abort();
 }
 
 void writeText(const std::string& path, const std::string& text) {
@@ -64,19 +73,29 @@ Bench::Bench() {
 
 std::array<Bench::Channel, 4> Bench::pwm() const {
   std::array<Channel, 4> channels{};
-  std::ifstream file(kDebug + "pwm_state", std::ios::binary);
-  file.read(reinterpret_cast<char*>(channels.data()), sizeof channels);
+  const ssize_t n = pread(keptFd(kDebug + "pwm_state", O_RDONLY), channels.data(), sizeof channels, 0);
+  if (n != static_cast<ssize_t>(sizeof channels)) std::abort();
   return channels;
 }
 
+const std::string& Bench::simDirectory(const std::string& chip) const {
+  std::string& known = sim_directories_[chip];
+  if (known.empty()) {
+    const std::string config = "/sys/kernel/config/gpio-sim/" + chip;
+    known = "/sys/devices/platform/" + readLine(config + "/dev_name") + "/" +
+            readLine(config + "/bank/chip_name");
+  }
+  return known;
+}
+
 std::string Bench::simPath(const std::string& chip, unsigned line, const std::string& attribute) const {
-  const std::string config = "/sys/kernel/config/gpio-sim/" + chip;
-  return "/sys/devices/platform/" + readLine(config + "/dev_name") + "/" +
-         readLine(config + "/bank/chip_name") + "/sim_gpio" + std::to_string(line) + "/" + attribute;
+  return simDirectory(chip) + "/sim_gpio" + std::to_string(line) + "/" + attribute;
 }
 
 bool Bench::pin(const std::string& chip, unsigned line) const {
-  return readLine(simPath(chip, line, "value")) == "1";
+  char level = '?';
+  if (pread(keptFd(simPath(chip, line, "value"), O_RDONLY), &level, 1, 0) != 1) std::abort();
+  return level == '1';
 }
 
 void Bench::drivePin(const std::string& chip, unsigned line, bool high) {
@@ -119,7 +138,9 @@ void Bench::fault(const std::string& device, int error, uint32_t times) {
   writeText(kDebug + device + "_error_count", std::to_string(times));
 }
 
-void Bench::unplug(const std::string& device) { writeText(kDebug + "unplug", device); }
+void Bench::unplug(const std::string& device) { writeText(kDebug + "plug", "-" + device); }
+
+void Bench::plug(const std::string& device) { writeText(kDebug + "plug", "+" + device); }
 
 uint8_t Bench::imuRegister(uint8_t reg) const {
   std::array<char, 128> bytes{};

@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <thread>
 #include <vector>
@@ -31,12 +32,16 @@ class Bench {
   void fault(const std::string& device, int error,
              uint32_t times);  // imu, pwm, counter, adc; UINT32_MAX: forever
   void unplug(const std::string& device);
+  void plug(const std::string& device);
   uint8_t imuRegister(uint8_t reg) const;
 
   static bbb_config_t mbbr();  // wired as config/boards/robotics_cape_mbbr.toml
 
  private:
+  const std::string& simDirectory(const std::string& chip) const;
   std::string simPath(const std::string& chip, unsigned line, const std::string& attribute) const;
+
+  mutable std::map<std::string, std::string> sim_directories_;
 };
 
 // The IMU's interrupt at 200 Hz, for as long as it lives.

@@ -217,8 +217,7 @@ TEST(CanHardware, ErrorFramesTellTheBusState) {
   can_close(&controller);
 }
 
-// Last: the devices do not come back.
-TEST(ZUnplugHardware, KeptDescriptorsReportTheMissingDevice) {
+TEST(UnplugHardware, KeptDescriptorsReportTheMissingDeviceAndItComesBack) {
   Bench bench;
   pwm_t pwm;
   eqep_t encoder;
@@ -233,4 +232,10 @@ TEST(ZUnplugHardware, KeptDescriptorsReportTheMissingDevice) {
   eqep_close(&encoder);
   EXPECT_EQ(pwm_open(&pwm, "48304200", 0, kPeriod_ns), -ENODEV);
   EXPECT_EQ(eqep_open(&encoder, "48304180"), -ENODEV);
+  bench.plug("48304200");
+  bench.plug("48304180");
+  ASSERT_EQ(pwm_open(&pwm, "48304200", 0, kPeriod_ns), 0);
+  EXPECT_EQ(eqep_open(&encoder, "48304180"), 0);
+  pwm_close(&pwm);
+  eqep_close(&encoder);
 }

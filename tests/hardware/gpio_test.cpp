@@ -69,17 +69,21 @@ TEST_F(GpioHardware, EdgesCarryTheirMonotonicTime) {
   EXPECT_LE(edge_ns, after_ns + 1000000000);
 }
 
-TEST_F(GpioHardware, ReportsHowManyEdgesAndTheNewest) {
+TEST_F(GpioHardware, SeveralEdgesAreOneAnswerWithTheNewestTime) {
   const gpio_pin_t pin = {"481ae000", 21, true};
   ASSERT_EQ(gpio_open_edge(&line_, &pin, GPIO_FALLING), 0);
   bench_.dataReady();
   bench_.dataReady();
   const int64_t before_last_ns = monotonic_ns();
   bench_.dataReady();
-  usleep(100000);  // the threaded interrupt has run
   int64_t edge_ns = 0;
-  EXPECT_EQ(gpio_wait_edge(&line_, monotonic_ns(), &edge_ns), 3);
-  EXPECT_GE(edge_ns, before_last_ns);
+  int edges = 0;
+  while (edge_ns < before_last_ns) {  // the simulated interrupt may merge edges, but not lose the last
+    const int more = gpio_wait_edge(&line_, monotonic_ns() + 5000000000, &edge_ns);
+    ASSERT_GT(more, 0);
+    edges += more;
+  }
+  EXPECT_LE(edges, 3);
   EXPECT_EQ(gpio_wait_edge(&line_, monotonic_ns() + 2000000, &edge_ns), 0);
 }
 

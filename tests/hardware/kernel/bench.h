@@ -24,10 +24,10 @@ int bench_imu_init(struct dentry *dir);
 void bench_imu_exit(void);
 int bench_pwm_init(struct dentry *dir);
 void bench_pwm_exit(void);
-bool bench_pwm_unplug(const char *name);
+int bench_pwm_plug(const char *name, bool in);
 int bench_counter_init(struct dentry *dir);
 void bench_counter_exit(void);
-bool bench_counter_unplug(const char *name);
+int bench_counter_plug(const char *name, bool in);
 int bench_adc_init(struct dentry *dir);
 void bench_adc_exit(void);
 

@@ -143,6 +143,8 @@ static int plug(struct bench_decoder *decoder)
 		goto no_counter;
 	}
 	decoder->counter = counter;
+	decoder->ceiling = 0;
+	decoder->enabled = 0;
 	return 0;
 no_counter:
 	platform_device_unregister(decoder->device);
@@ -160,17 +162,21 @@ static void unplug(struct bench_decoder *decoder)
 	decoder->device = NULL;
 }
 
-bool bench_counter_unplug(const char *name)
+/* -ENODEV: not one of ours. */
+int bench_counter_plug(const char *name, bool in)
 {
 	int i;
 
 	for (i = 0; i < DECODERS; i++) {
-		if (!strcmp(decoders[i].name, name)) {
+		if (strcmp(decoders[i].name, name))
+			continue;
+		if (!in)
 			unplug(&decoders[i]);
-			return true;
-		}
+		else if (!decoders[i].device)
+			return plug(&decoders[i]);
+		return 0;
 	}
-	return false;
+	return -ENODEV;
 }
 
 /* Three s64, the machine's byte order. */

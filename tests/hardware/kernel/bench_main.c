@@ -29,24 +29,28 @@ void bench_fault_files(const char *name, struct dentry *dir, struct bench_fault 
 	debugfs_create_u32(file, 0644, dir, &fault->count);
 }
 
-/* "48302200" takes that device away as a driver's unbinding would. */
-static ssize_t unplug_write(struct file *file, const char __user *from, size_t size, loff_t *at)
+/* "-48302200" takes that device away as a driver's unbinding would, "+48302200" brings it back. */
+static ssize_t plug_write(struct file *file, const char __user *from, size_t size, loff_t *at)
 {
-	char name[32] = {};
+	char text[32] = {};
+	int err;
 
-	if (size >= sizeof(name))
+	if (size < 2 || size >= sizeof(text))
 		return -EINVAL;
-	if (copy_from_user(name, from, size))
+	if (copy_from_user(text, from, size))
 		return -EFAULT;
-	strim(name);
-	if (!bench_pwm_unplug(name) && !bench_counter_unplug(name))
-		return -ENODEV;
-	return size;
+	if (text[0] != '+' && text[0] != '-')
+		return -EINVAL;
+	strim(text);
+	err = bench_pwm_plug(text + 1, text[0] == '+');
+	if (err == -ENODEV)
+		err = bench_counter_plug(text + 1, text[0] == '+');
+	return err ? err : size;
 }
 
-static const struct file_operations unplug_fops = {
+static const struct file_operations plug_fops = {
     .owner = THIS_MODULE,
-    .write = unplug_write,
+    .write = plug_write,
 };
 
 static int __init bench_init(void)
@@ -54,7 +58,7 @@ static int __init bench_init(void)
 	int err;
 
 	bench_dir = debugfs_create_dir("robot_bench", NULL);
-	debugfs_create_file("unplug", 0200, bench_dir, NULL, &unplug_fops);
+	debugfs_create_file("plug", 0200, bench_dir, NULL, &plug_fops);
 	err = bench_imu_init(bench_dir);
 	if (err)
 		goto no_imu;

@@ -61,6 +61,8 @@ static int plug(struct bench_module *module, int index)
 		return err;
 	}
 	module->channel = &channels[index * CHANNELS];
+	memset(module->channel, 0, CHANNELS * sizeof(*module->channel));
+	memset(&module->chip, 0, sizeof(module->chip));
 	module->chip.dev = &module->device->dev;
 	module->chip.ops = &ops;
 	module->chip.npwm = CHANNELS;
@@ -81,17 +83,21 @@ static void unplug(struct bench_module *module)
 	module->device = NULL;
 }
 
-bool bench_pwm_unplug(const char *name)
+/* -ENODEV: not one of ours. */
+int bench_pwm_plug(const char *name, bool in)
 {
 	int i;
 
 	for (i = 0; i < MODULES; i++) {
-		if (!strcmp(modules[i].name, name)) {
+		if (strcmp(modules[i].name, name))
+			continue;
+		if (!in)
 			unplug(&modules[i]);
-			return true;
-		}
+		else if (!modules[i].device)
+			return plug(&modules[i], i);
+		return 0;
 	}
-	return false;
+	return -ENODEV;
 }
 
 int bench_pwm_init(struct dentry *dir)
