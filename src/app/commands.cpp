@@ -2,15 +2,24 @@
 
 #include <cstdio>
 #include <fstream>
+#include <sstream>
 
 namespace equipoise::app {
 
 void add_commands(CLI::App& app, int* status) {
   add_sim(app, status);
+  add_run(app, status);
   add_model(app, status);
   add_bridge(app, status);
   add_geometry(app, status);
   add_motor_bench(app, status);
+}
+
+std::string read_text(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) throw InputError(path + ": cannot be read");
+  return text.str();
 }
 
 nlohmann::json read_json(const std::string& path) {

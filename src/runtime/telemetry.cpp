@@ -170,6 +170,8 @@ class Telemetry::Writer {
     m.version = run.version;
     m.config_sha256 = run.config_sha256;
     m.config_toml = run.config_toml;
+    m.backend = run.backend;
+    m.board_toml = run.board_toml;
     publish_now_ = lcm_ != nullptr;
     emit("EQUIPOISE_RUN", m);
   }

@@ -30,6 +30,8 @@ struct RunInfo {
   std::string version;
   std::string config_sha256;
   std::string config_toml;
+  std::string backend;     // sim, board, lockstep
+  std::string board_toml;  // on hardware, the wiring
 };
 
 struct TelemetryOptions {
