@@ -17,6 +17,10 @@ void add_commands(CLI::App& app, int* status);
 
 void add_sim(CLI::App& app, int* status);
 void add_run(CLI::App& app, int* status);
+void add_convert(CLI::App& app, int* status);
+void add_keygen(CLI::App& app, int* status);
+void add_send(CLI::App& app, int* status);
+void add_replay(CLI::App& app, int* status);
 void add_model(CLI::App& app, int* status);
 void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);

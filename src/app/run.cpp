@@ -4,6 +4,7 @@
 #include "bbb.h"
 #include "board.hpp"
 #include "commands.hpp"
+#include "equipoise/runtime/command_receiver.hpp"
 #include "flight.hpp"
 #include "lockstep.hpp"
 #include "reasons.hpp"
@@ -26,7 +27,11 @@ struct Arguments {
   double yaw_hz = 0.0;
   double drive_mps = 0.0;
   double timeout_s = 5.0;
+  std::int64_t log_max_mb = 200;      // half an hour
+  std::int64_t log_min_free_mb = 20;  // for others on the disk
   bool arm = false;
+  std::string command_key;
+  std::string command_url = runtime::kDefaultTelemetryUrl;
 };
 
 /// As in sim: motors half a second after the start, motion after a second.
@@ -62,7 +67,12 @@ class Runner {
       : a_(a),
         loaded_(Firmware::load(a.config, overrides)),
         config_(Firmware::apply(loaded_.config, a.choice)),
-        board_toml_(board_toml) {}
+        board_toml_(board_toml) {
+    if (!a.command_key.empty()) {
+      receiver_ =
+          std::make_unique<runtime::CommandReceiver>(runtime::CommandKey::load(a.command_key), a.command_url);
+    }
+  }
 
   const Calibration& calibration() const { return config_.calibration; }
 
@@ -73,6 +83,9 @@ class Runner {
     options.log_path = outcome.log;
     options.url = a_.telemetry == "off" ? "" : a_.telemetry;
     if (a_.choice.compare) options.estimators = Firmware::estimators();
+    options.max_log_bytes = a_.log_max_mb * 1000000;
+    options.min_free_bytes = a_.log_min_free_mb * 1000000;
+    options.sync = a_.backend == "board";
     options.run = run_info<Firmware>(loaded_, a_.choice, 0);
     options.run.backend = a_.backend;
     options.run.board_toml = board_toml_;
@@ -80,7 +93,7 @@ class Runner {
     const FlightLimits limits{a_.duration_s, a_.backend != "board"};
     outcome.flight = Firmware::with_pipeline(config_, a_.choice.controller, [&](auto& pipeline) {
       const auto commands = [&](std::int64_t tick, std::int64_t) {
-        return script(a_, static_cast<double>(tick) * kTickS);
+        return receiver_ ? receiver_->latest() : script(a_, static_cast<double>(tick) * kTickS);
       };
       return app::fly(io, pipeline, commands, limits, telemetry);
     });
@@ -106,6 +119,7 @@ class Runner {
   typename Firmware::Loaded loaded_;
   typename Firmware::Config config_;
   std::string board_toml_;
+  std::unique_ptr<runtime::CommandReceiver> receiver_;  // null: the script
 };
 
 nlohmann::json to_json(const Arguments& a, const std::string& robot, const Outcome& o, int flights,
@@ -143,7 +157,7 @@ int report(const Arguments& a, const std::string& robot, Outcome o, int flights,
   if (o.error.empty() && f.fell)
     o.error =
         "the motors went off at " + std::to_string(f.fell_at_s) + " s: " + joined(reason_names(f.reasons));
-  if (o.error.empty() && a.arm && !f.armed && f.duration_s() > 0.6)
+  if (o.error.empty() && a.arm && a.command_key.empty() && !f.armed && f.duration_s() > 0.6)
     o.error = "the robot never armed: " + joined(reason_names(f.reasons));
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   std::fprintf(out, "%s after %.1f s  (%s, %s, %s)\n",
@@ -269,11 +283,21 @@ void add_run(CLI::App& app, int* status) {
   command->add_option("--drive-mps", a->drive_mps, "drive speed, m/s")->check(CLI::Range(-2.0, 2.0));
   auto* arm = command->add_flag("--arm,!--no-arm", a->arm,
                                 "request the motors 0.5 s after the start (default: lockstep only)");
+  command->add_option("--command-key", a->command_key,
+                      "take commands of holders of this key (keygen, send) instead of the script");
+  command->add_option("--command-url", a->command_url, "LCM provider URL to listen on with --command-key")
+      ->capture_default_str();
   command->add_option("--estimator", a->choice.estimator, "who controls (default: the robot's)");
   command->add_option("--controller", a->choice.controller, "state feedback (default: the robot's)");
   command->add_flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command->add_option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
   command->add_option("--log", a->log, "LCM event log (default: logs/run-BACKEND.lcm)");
+  command->add_option("--log-max-mb", a->log_max_mb, "continue the log in a further file after this much, MB")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  command->add_option("--log-min-free-mb", a->log_min_free_mb, "delete the run's oldest files below this, MB")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1000000));
   command->add_option("--json", a->json, "summary as JSON, - for stdout");
   command->add_option("--telemetry", a->telemetry, "LCM provider URL, or off")->capture_default_str();
   command->callback([=] {
