@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 #include "flight.hpp"
+#include "key_file.hpp"
 #include "lockstep.hpp"
 #include "reasons.hpp"
 #include "self_test.hpp"
@@ -69,8 +70,7 @@ class Runner {
         config_(Firmware::apply(loaded_.config, a.choice)),
         board_toml_(board_toml) {
     if (!a.command_key.empty()) {
-      receiver_ =
-          std::make_unique<runtime::CommandReceiver>(runtime::CommandKey::load(a.command_key), a.command_url);
+      receiver_ = std::make_unique<runtime::CommandReceiver>(load_key(a.command_key), a.command_url);
     }
   }
 

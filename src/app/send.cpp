@@ -9,6 +9,7 @@
 #include "equipoise/runtime/command_receiver.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 #include "interrupt.hpp"
+#include "key_file.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -59,7 +60,7 @@ Clock::time_point after(double seconds) {
 }
 
 int send(const Arguments& a) {
-  const CommandKey key = CommandKey::load(a.key);
+  const CommandKey key = load_key(a.key);
   Robot robot(a.url);
   watch_interrupts();
   for (const auto limit = after(a.timeout_s); !robot.session();) {
@@ -103,7 +104,7 @@ void add_keygen(CLI::App& app, int* status) {
   auto path = std::make_shared<std::string>();
   command->add_option("file", *path, "new file, for its owner only; copy it to the robot")->required();
   command->callback([=] {
-    CommandKey::create(*path);
+    create_key(*path);
     std::printf("%s\n", path->c_str());
     *status = 0;
   });

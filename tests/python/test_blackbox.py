@@ -24,12 +24,24 @@ SCENARIOS = [
 
 def equipoise_run(root, *arguments):
     return subprocess.run(
-        list(map(str, [root / "build/host/equipoise", *arguments])), capture_output=True, text=True, timeout=120
+        list(map(str, [root / "build/host/equipoise", *arguments])),
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
 
 
 def simulate(root, log, *arguments, seconds=6):
-    common = ["--config", root / "config/mbbr.toml", "--telemetry", "off", "--log", log, "--duration-s", seconds]
+    common = [
+        "--config",
+        root / "config/mbbr.toml",
+        "--telemetry",
+        "off",
+        "--log",
+        log,
+        "--duration-s",
+        seconds,
+    ]
     ended = equipoise_run(root, "sim", *common, *arguments)
     assert ended.returncode in (0, 1), ended.stderr  # 1: it fell, which has to replay as well
     return log
@@ -116,7 +128,8 @@ def test_another_filter_is_tried_on_the_same_flight(root, tmp_path):
             simulated[name]["attitude_rmse_rad"], rel=1e-3
         )
     assert (
-        result["errors"]["ekf"]["attitude_rmse_rad"] < result["errors"]["ekf13_published"]["attitude_rmse_rad"]
+        result["errors"]["ekf"]["attitude_rmse_rad"]
+        < result["errors"]["ekf13_published"]["attitude_rmse_rad"]
     )
 
 
@@ -144,7 +157,14 @@ def test_what_is_no_log_is_refused(root, tmp_path):
 
 def start_lockstep(root, tmp_path, *arguments):
     path = tmp_path / "io.sock"
-    command = [root / "build/host/equipoise", "run", "--config", root / "config/mbbr.toml", "--telemetry", "off"]
+    command = [
+        root / "build/host/equipoise",
+        "run",
+        "--config",
+        root / "config/mbbr.toml",
+        "--telemetry",
+        "off",
+    ]
     command += ["--backend", "lockstep", "--socket", path, "--log", tmp_path / "run.lcm"]
     process = subprocess.Popen(list(map(str, [*command, *arguments])), stderr=subprocess.DEVNULL)
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
