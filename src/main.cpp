@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 
@@ -8,6 +9,9 @@
 namespace {
 
 int run(int argc, char** argv) {
+  // A closed pipe or a full disk is an error to report, not a reason to vanish.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{"Equipoise: firmware and simulator of two balancing robots"};
   app.set_version_flag("--version", EQUIPOISE_VERSION);
   app.require_subcommand(1);

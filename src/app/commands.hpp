@@ -16,11 +16,18 @@ struct InputError : std::runtime_error {
 void add_commands(CLI::App& app, int* status);
 
 void add_sim(CLI::App& app, int* status);
+void add_run(CLI::App& app, int* status);
+void add_convert(CLI::App& app, int* status);
+void add_keygen(CLI::App& app, int* status);
+void add_send(CLI::App& app, int* status);
+void add_replay(CLI::App& app, int* status);
 void add_model(CLI::App& app, int* status);
 void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);
 void add_motor_bench(CLI::App& app, int* status);
 
+/// A whole file; InputError names it.
+std::string read_text(const std::string& path);
 /// Reads a JSON file; InputError names it.
 nlohmann::json read_json(const std::string& path);
 /// Writes to a file, or to stdout where `path` is "-".

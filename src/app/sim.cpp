@@ -138,6 +138,7 @@ int run(Arguments a) {
   if (a.realtime) telemetry_options.max_publish_hz = 2.0 * kTickHz;
   telemetry_options.estimators = Firmware::estimators();
   telemetry_options.run = run_info<Firmware>(loaded, a.choice, static_cast<std::int64_t>(a.options.seed));
+  telemetry_options.run.backend = "sim";
   runtime::Telemetry telemetry(telemetry_options);
 
   std::signal(SIGINT, on_signal);

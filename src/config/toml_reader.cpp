@@ -177,8 +177,9 @@ std::string Section::text(const std::string& key) {
   return *value;
 }
 
-std::pair<std::string, int> Section::text_and_integer(const std::string& key, int min, int max) {
-  const toml::array* pair = node(key).as_array();
+std::pair<std::string, int> Section::pair_of(const toml::node& node, const std::string& key, int min,
+                                             int max) const {
+  const toml::array* pair = node.as_array();
   if (pair == nullptr || pair->size() != 2) fail(key, "expected a pair of a string and a whole number");
   const auto text = pair->get(0)->value_exact<std::string>();
   const auto number = pair->get(1)->value_exact<std::int64_t>();
@@ -186,6 +187,20 @@ std::pair<std::string, int> Section::text_and_integer(const std::string& key, in
   if (*number < min || *number > max)
     fail(key, std::to_string(*number) + " is out of range; " + range(min, max));
   return {*text, static_cast<int>(*number)};
+}
+
+std::pair<std::string, int> Section::text_and_integer(const std::string& key, int min, int max) {
+  return pair_of(node(key), key, min, max);
+}
+
+std::vector<std::pair<std::string, int>> Section::texts_and_integers(const std::string& key,
+                                                                     std::size_t count, int min, int max) {
+  const toml::array* array = node(key).as_array();
+  if (array == nullptr || array->size() > count)
+    fail(key, "expected an array of at most " + std::to_string(count) + " pairs");
+  std::vector<std::pair<std::string, int>> pairs;
+  for (const toml::node& element : *array) pairs.push_back(pair_of(element, key, min, max));
+  return pairs;
 }
 
 std::size_t Section::choice(const std::string& key, const std::vector<std::string>& names) {

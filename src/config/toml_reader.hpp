@@ -49,6 +49,9 @@ class Section {
   std::string text(const std::string& key);
   /// A pair such as ["44e07000", 20].
   std::pair<std::string, int> text_and_integer(const std::string& key, int min, int max);
+  /// An array of such pairs, at most `count`.
+  std::vector<std::pair<std::string, int>> texts_and_integers(const std::string& key, std::size_t count,
+                                                              int min, int max);
   /// Index of the value in `names`.
   std::size_t choice(const std::string& key, const std::vector<std::string>& names);
   std::vector<double> numbers(const std::string& key, std::size_t count, double min, double max);
@@ -64,6 +67,7 @@ class Section {
 
  private:
   const toml::node& node(const std::string& key);
+  std::pair<std::string, int> pair_of(const toml::node& node, const std::string& key, int min, int max) const;
 
   const Document& document_;
   const toml::table& table_;

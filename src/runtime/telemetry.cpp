@@ -1,7 +1,6 @@
 #include "equipoise/runtime/telemetry.hpp"
 
 #include <lcm/lcm.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
@@ -16,6 +15,8 @@
 #include <equipoise/state_t.hpp>
 #include <equipoise/timing_t.hpp>
 #include <stdexcept>
+
+#include "log_writer.hpp"
 
 namespace equipoise::runtime {
 namespace {
@@ -51,11 +52,9 @@ class Telemetry::Writer {
  public:
   Writer(const TelemetryOptions& options, TelemetryReport* report, std::atomic<bool>* log_failed)
       : options_(options), report_(report), log_failed_(log_failed) {
-    if (!options.log_path.empty()) {
-      log_ = lcm_eventlog_create(options.log_path.c_str(), "w");
-      if (log_ == nullptr) {
-        throw std::runtime_error(options.log_path + ": log cannot be created: " + std::strerror(errno));
-      }
+    const LogLimits limits{options.max_log_bytes, options.min_free_bytes, options.sync};
+    if (!options.log_path.empty() && !log_.open(options.log_path, limits)) {
+      throw std::runtime_error(options.log_path + ": log cannot be created: " + std::strerror(errno));
     }
     if (!options.url.empty()) {
       lcm_ = lcm_create(options.url.c_str());
@@ -98,65 +97,43 @@ class Telemetry::Writer {
     motors(r);
     health(r);
     timing(r);
+    log_.end_tick();
+    note_failure();
     ++report_->records;
   }
 
-  /// Flushes; a log on a full disk is cut back to its last whole event.
+  /// Nothing to do: what is written so far goes to the kernel.
+  void idle() {
+    log_.flush();
+    note_failure();
+  }
+
   void close_log() {
-    if (log_ == nullptr) return;
-    if (std::fflush(log_->f) != 0) fail_log(errno);
-    if (log_failed_->load()) {
-      // What the buffer could not write must not be appended after the cut.
-      const int fd = dup(fileno(log_->f));
-      lcm_eventlog_destroy(log_);
-      if (fd >= 0) {
-        if (ftruncate(fd, static_cast<off_t>(whole_bytes_)) != 0)
-          report_->log_error += "; its last event is torn";
-        close(fd);
-      }
-    } else {
-      lcm_eventlog_destroy(log_);
-    }
-    log_ = nullptr;
+    log_.close();
+    note_failure();
   }
 
  private:
   template <class Message>
-  void emit(const char* channel, Message& message) {
-    message.utime = utime_;
-    if constexpr (!std::is_same_v<Message, run_t>) message.tick = tick_;
+  void encode(const Message& message) {
     const int size = message.getEncodedSize();
     buffer_.resize(static_cast<std::size_t>(size));
     message.encode(buffer_.data(), 0, size);
-    if (log_ != nullptr && !log_failed_->load(std::memory_order_relaxed)) log(channel, size);
-    if (publish_now_) lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned>(size));
   }
 
-  void log(const char* channel, int size) {
-    lcm_eventlog_event_t event{};
-    event.eventnum = event_number_++;
-    event.timestamp = utime_;
-    event.channellen = static_cast<std::int32_t>(std::strlen(channel));
-    event.datalen = size;
-    event.channel = const_cast<char*>(channel);
-    event.data = buffer_.data();
-    errno = 0;
-    const bool written = lcm_eventlog_write_event(log_, &event) == 0;
-    pending_bytes_ += kEventHeaderBytes + static_cast<std::size_t>(event.channellen + size);
-    ++pending_events_;
-    const bool flush = pending_events_ >= kFlushEvents;
-    if (!written || (flush && std::fflush(log_->f) != 0)) {
-      fail_log(errno);
-    } else if (flush) {
-      whole_bytes_ += pending_bytes_;
-      pending_bytes_ = 0;
-      pending_events_ = 0;
-    }
+  template <class Message>
+  void emit(const char* channel, Message& message) {
+    message.utime = utime_;
+    message.tick = tick_;
+    encode(message);
+    log_.write(utime_, channel, buffer_.data(), static_cast<int>(buffer_.size()));
+    if (publish_now_) lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned>(buffer_.size()));
   }
 
-  void fail_log(int error) {
-    if (log_failed_->exchange(true)) return;
-    report_->log_error = options_.log_path + ": log stopped: " + std::strerror(error != 0 ? error : EIO);
+  void note_failure() {
+    if (log_.error().empty()) return;
+    report_->log_error = log_.error();
+    log_failed_->store(true);
   }
 
   void announce(const RunInfo& run) {
@@ -170,8 +147,12 @@ class Telemetry::Writer {
     m.version = run.version;
     m.config_sha256 = run.config_sha256;
     m.config_toml = run.config_toml;
-    publish_now_ = lcm_ != nullptr;
-    emit("EQUIPOISE_RUN", m);
+    m.backend = run.backend;
+    m.board_toml = run.board_toml;
+    encode(m);
+    log_.preamble(utime_, "EQUIPOISE_RUN", buffer_);
+    if (lcm_ != nullptr)
+      lcm_publish(lcm_, "EQUIPOISE_RUN", buffer_.data(), static_cast<unsigned>(buffer_.size()));
   }
 
   void sensors(const TickRecord& r) {
@@ -231,13 +212,10 @@ class Telemetry::Writer {
     emit("EQUIPOISE_TIMING", m);
   }
 
-  static constexpr std::size_t kEventHeaderBytes = 28;  // sync, event number, time stamp, two lengths
-  static constexpr int kFlushEvents = 200;              // about 100 ms of ticks are at risk in a power cut
-
   const TelemetryOptions& options_;
   TelemetryReport* report_;
   std::atomic<bool>* log_failed_;
-  lcm_eventlog_t* log_ = nullptr;
+  LogWriter log_;
   lcm_t* lcm_ = nullptr;
   std::vector<std::string> channels_;
   std::vector<std::uint8_t> buffer_;
@@ -245,10 +223,6 @@ class Telemetry::Writer {
   bool publish_now_ = false;
   std::int64_t utime_ = 0;
   std::int64_t tick_ = 0;
-  std::int64_t event_number_ = 0;
-  std::size_t whole_bytes_ = 0;
-  std::size_t pending_bytes_ = 0;
-  int pending_events_ = 0;
 };
 
 Telemetry::Telemetry(const TelemetryOptions& options)
@@ -279,7 +253,10 @@ void Telemetry::run() {
       any = true;
     }
     if (stopping) break;
-    if (!any) std::this_thread::sleep_for(kIdle);
+    if (!any) {
+      writer_->idle();
+      std::this_thread::sleep_for(kIdle);
+    }
   }
   writer_->close_log();
 }

@@ -1,7 +1,8 @@
 // Takes one record per tick from the real-time thread and, on a thread of its own, writes it to an LCM event
 // log and publishes it. In: TickRecord, lock-free -> out: log file, LCM messages (package equipoise).
-// hand_over() is RT-safe; everything else is not. A telemetry URL that cannot be opened is a warning, never a
-// reason not to fly; a log that cannot be written is reported by finish() and by log_failed().
+// hand_over() is RT-safe; everything else is not. SIGKILL costs the log less than 100 ms. A telemetry URL
+// that cannot be opened is a warning, never a reason not to fly; a log that cannot be written is reported by
+// finish() and by log_failed().
 #pragma once
 
 #include <atomic>
@@ -30,11 +31,16 @@ struct RunInfo {
   std::string version;
   std::string config_sha256;
   std::string config_toml;
+  std::string backend;     // sim, board, lockstep
+  std::string board_toml;  // on hardware, the wiring
 };
 
 struct TelemetryOptions {
   std::string log_path;                 // empty: no log
   std::string url;                      // LCM provider; empty: nothing is published
+  std::int64_t max_log_bytes = 0;       // then the log goes on in NAME.0001.lcm, ...; 0: one file
+  std::int64_t min_free_bytes = 0;      // below it the run's oldest files are deleted, then the log stops
+  bool sync = false;                    // to the disk itself, for a power cut; else to the kernel
   double max_publish_hz = 100.0;        // of wall-clock time; the log always has every tick
   bool wait_when_full = false;          // simulation faster than real time: wait rather than drop
   std::vector<std::string> estimators;  // names of TickRecord::others

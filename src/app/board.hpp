@@ -1,0 +1,37 @@
+// A board file (config/boards/*.toml): wiring for the drivers, and what of it the calibration has to know.
+// In: path -> out: Board; ConfigError (file:line: key: reason and what is allowed) otherwise. Start-up only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bbb_config.h"
+
+namespace equipoise::app {
+
+struct BoardLine {
+  std::string chip;
+  int line = 0;
+};
+
+struct Board {
+  std::string robot;  // "mbbr" or "mip"
+  bbb_config_t wiring{};
+  BoardLine led_red, led_green;
+  std::vector<BoardLine> led_bars;
+  BoardLine button_pause, button_mode;
+  bool buttons_active_low = true;
+  int dc_jack_channel = 0;
+  std::string serial_device;
+  int serial_baud = 0;
+  std::string can_interface;  // empty: no CAN
+  int can_bitrate = 0;
+  /// --set overrides: the board's mount rotation and battery scale instead of the configuration's.
+  std::vector<std::string> calibration;
+};
+
+Board load_board(const std::string& path);
+/// From text; `origin` names it in errors.
+Board parse_board(const std::string& text, const std::string& origin);
+
+}  // namespace equipoise::app

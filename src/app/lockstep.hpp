@@ -1,0 +1,75 @@
+// A rio_t whose robot is another process: a physics engine connects to a Unix SOCK_SEQPACKET socket, sends
+// one lockstep_sensors_t per tick and gets one lockstep_motors_t back (docs/lockstep.md). In: SI, body axes
+// -> out: device counts by the inverse of the calibration, so the pipeline runs as on the robot. An engine
+// that dies, stalls or talks nonsense ends the ticks; error() says why. Not real-time: the engine's clock
+// rules.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "equipoise/lockstep_sensors_t.hpp"
+#include "equipoise/sense/calibrate.hpp"
+#include "robot_io.h"
+
+namespace equipoise::app {
+
+/// Listens on the path, for its owner only. A socket nobody listens on any more is replaced; anything else in
+/// the way is an InputError. Removes the path at the end.
+class LockstepServer {
+ public:
+  explicit LockstepServer(const std::string& path);
+  ~LockstepServer();
+  LockstepServer(const LockstepServer&) = delete;
+  LockstepServer& operator=(const LockstepServer&) = delete;
+
+  /// File descriptor of the next engine; -ETIMEDOUT, or -EINTR on a signal.
+  int accept_engine(double timeout_s) const;
+
+ private:
+  std::string path_;
+  int fd_ = -1;
+};
+
+enum class LockstepEnd { kRunning, kFinished, kPeerGone, kTimeout, kProtocol };
+
+class Lockstep {
+ public:
+  /// Owns the connection `fd`.
+  Lockstep(int fd, const Calibration& calibration, double timeout_s);
+  ~Lockstep();
+  Lockstep(const Lockstep&) = delete;
+  Lockstep& operator=(const Lockstep&) = delete;
+
+  rio_t io() noexcept;
+  LockstepEnd end() const noexcept { return end_; }
+  const std::string& error() const noexcept { return error_; }
+
+ private:
+  static int wait_tick(void* self, std::int64_t* now_ns);
+  static int read_sensors(void* self, rio_sensors_t* out);
+  static int write_motors(void* self, const rio_motors_t* motors);
+  static int motors_off(void* self);
+  static void close(void* self);
+
+  int receive();
+  int answer(const rio_motors_t& motors, bool last);
+  int stop(LockstepEnd end, int code, const std::string& why);
+
+  int fd_;
+  Calibration calibration_;
+  int timeout_ms_;
+  lockstep_sensors_t sensors_{};
+  std::int64_t next_step_ = 0;
+  bool owes_answer_ = false;
+  LockstepEnd end_ = LockstepEnd::kRunning;
+  std::string error_;
+};
+
+/// Inverse of calibrate(): what the devices would have counted.
+rio_sensors_t counts_of(const lockstep_sensors_t& sensors, const Calibration& calibration) noexcept;
+
+/// Length and type checked; false leaves `out` undefined.
+bool decode_lockstep_sensors(const void* data, std::size_t size, lockstep_sensors_t* out);
+
+}  // namespace equipoise::app

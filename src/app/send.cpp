@@ -1,0 +1,133 @@
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <lcm/lcm-cpp.hpp>
+#include <optional>
+
+#include "commands.hpp"
+#include "equipoise/runtime/command_receiver.hpp"
+#include "equipoise/runtime/telemetry.hpp"
+#include "interrupt.hpp"
+#include "key_file.hpp"
+
+namespace equipoise::app {
+namespace {
+
+using runtime::CommandKey;
+using runtime::CommandReceiver;
+using Clock = std::chrono::steady_clock;
+
+struct Arguments {
+  std::string key;
+  std::string url = runtime::kDefaultTelemetryUrl;
+  double drive_mps = 0.0;
+  double sideways_mps = 0.0;
+  double yaw_hz = 0.0;
+  double duration_s = 0.2;
+  double timeout_s = 2.0;
+  bool arm = false;
+  bool heading_reset = false;
+};
+
+/// What the robot says about itself.
+class Robot {
+ public:
+  explicit Robot(const std::string& url) : lcm_(url) {
+    if (!lcm_.good())
+      throw InputError("--url " + url + ": cannot be opened (is there a route for multicast?)");
+    lcm_.subscribeFunction(
+        CommandReceiver::kSessionChannel,
+        +[](const lcm::ReceiveBuffer* buffer, const std::string&, Robot* self) {
+          command_session_t heard;
+          const auto size = static_cast<int>(buffer->data_size);
+          if (heard.decode(buffer->data, 0, size) == size) self->session_ = heard;
+        },
+        this);
+  }
+
+  void listen(int milliseconds) { lcm_.handleTimeout(milliseconds); }
+  const std::optional<command_session_t>& session() const { return session_; }
+  void send(const signed_command_t& message) { lcm_.publish(CommandReceiver::kCommandChannel, &message); }
+
+ private:
+  lcm::LCM lcm_;
+  std::optional<command_session_t> session_;
+};
+
+Clock::time_point after(double seconds) {
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+int send(const Arguments& a) {
+  const CommandKey key = load_key(a.key);
+  Robot robot(a.url);
+  watch_interrupts();
+  for (const auto limit = after(a.timeout_s); !robot.session();) {
+    if (Clock::now() > limit || interrupted.load())
+      throw std::runtime_error("no robot that takes commands is heard on " + a.url +
+                               " (it needs equipoise run --command-key FILE)");
+    robot.listen(20);
+  }
+  signed_command_t m{};
+  std::memcpy(m.session, robot.session()->session, sizeof m.session);
+  m.sequence = robot.session()->last_sequence;
+  m.velocity_W_m_s[0] = a.drive_mps;
+  m.velocity_W_m_s[1] = a.sideways_mps;
+  m.yaw_rate_rad_s = 2.0 * kPi * a.yaw_hz;
+  m.arm = a.arm ? 1 : 0;
+  m.heading_reset = a.heading_reset ? 1 : 0;
+  const auto end = after(a.duration_s);
+  std::int64_t sent = 0;
+  do {
+    ++m.sequence;
+    key.sign(&m);
+    robot.send(m);
+    m.heading_reset = 0;
+    ++sent;
+    for (const auto next = after(0.05); Clock::now() < next;) robot.listen(10);
+  } while (Clock::now() < end && !interrupted.load());
+  for (const auto limit = after(a.timeout_s); robot.session()->last_sequence < m.sequence;) {
+    if (Clock::now() > limit)
+      throw std::runtime_error("the robot took none or not all of " + std::to_string(sent) +
+                               " commands; has it the same key?");
+    robot.listen(20);
+  }
+  std::printf("%lld commands accepted\n", static_cast<long long>(sent));
+  return 0;
+}
+
+}  // namespace
+
+void add_keygen(CLI::App& app, int* status) {
+  auto* command = app.add_subcommand("keygen", "Makes the key that senders and robot share");
+  auto path = std::make_shared<std::string>();
+  command->add_option("file", *path, "new file, for its owner only; copy it to the robot")->required();
+  command->callback([=] {
+    create_key(*path);
+    std::printf("%s\n", path->c_str());
+    *status = 0;
+  });
+}
+
+void add_send(CLI::App& app, int* status) {
+  auto* command = app.add_subcommand("send", "Commands a robot that runs with --command-key");
+  auto a = std::make_shared<Arguments>();
+  command->add_option("--key", a->key, "key file, see keygen")->required();
+  command->add_option("--url", a->url, "LCM provider URL of the robot's --command-url")
+      ->capture_default_str();
+  command->add_option("--drive-mps", a->drive_mps, "forward, m/s")->check(CLI::Range(-2.0, 2.0));
+  command->add_option("--sideways-mps", a->sideways_mps, "to the left, m/s")->check(CLI::Range(-2.0, 2.0));
+  command->add_option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second")->check(CLI::Range(-5.0, 5.0));
+  command->add_flag("--arm,!--disarm", a->arm, "motors on; off is the default");
+  command->add_flag("--heading-reset", a->heading_reset, "forward is where the robot points now");
+  command->add_option("--duration-s", a->duration_s, "repeat for this long, s")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 360000.0));
+  command->add_option("--timeout-s", a->timeout_s, "longest wait for the robot, s")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 60.0));
+  command->callback([=] { *status = send(*a); });
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,275 @@
+"""The log holds everything: replayed bit for bit, readable after SIGKILL, rotated, converted."""
+
+import csv
+import json
+import random
+import signal
+import socket
+import struct
+import subprocess
+import time
+
+import equipoise
+import numpy as np
+import pytest
+from equipoise_tools.lockstep_client import Robot
+from equipoise_tools.log import read_log
+
+SCENARIOS = [
+    (estimator, controller, fidelity)
+    for estimator in ("ekf", "ekf13", "ekf13_published", "kf_attitude", "truth")
+    for controller, fidelity in (("scheduled", "full"), ("thesis", "thesis"), ("scheduled", "ideal"))
+]
+
+
+def equipoise_run(root, *arguments):
+    return subprocess.run(
+        list(map(str, [root / "build/host/equipoise", *arguments])),
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def simulate(root, log, *arguments, seconds=6):
+    common = [
+        "--config",
+        root / "config/mbbr.toml",
+        "--telemetry",
+        "off",
+        "--log",
+        log,
+        "--duration-s",
+        seconds,
+    ]
+    ended = equipoise_run(root, "sim", *common, *arguments)
+    assert ended.returncode in (0, 1), ended.stderr  # 1: it fell, which has to replay as well
+    return log
+
+
+def replay(root, log, *arguments):
+    ended = equipoise_run(root, "replay", log, "--json", "-", *arguments)
+    assert ended.stdout, ended.stderr
+    return ended.returncode, json.loads(ended.stdout)
+
+
+@pytest.mark.parametrize(("estimator", "controller", "fidelity"), SCENARIOS)
+def test_every_scenario_replays_bit_for_bit(root, tmp_path, estimator, controller, fidelity):
+    choices = ["--estimator", estimator, "--controller", controller, "--fidelity", fidelity]
+    log = simulate(root, tmp_path / "run.lcm", *choices, "--yaw-hz", "0.75", "--drive-mps", "0.1")
+    status, result = replay(root, log)
+    assert (status, result["identical"], result["first_difference"]) == (0, True, None)
+    assert result["ticks"] == len(read_log(log)["EQUIPOISE_SENSORS"]) > 300
+    assert (result["estimator"], result["controller"]) == (estimator, controller)
+
+
+def test_overrides_are_in_the_log(root, tmp_path):
+    overrides = ["--set", "friction.compensation=0.7", "--set", "safety.max_tilt_rad=0.5"]
+    log = simulate(root, tmp_path / "run.lcm", *overrides)
+    assert replay(root, log)[1]["identical"]
+
+
+def rewrite(log, channel, tick, change):
+    """The log with one message changed."""
+    data = bytearray(log.read_bytes())
+    at = 0
+    while at < len(data):
+        name_size, size = struct.unpack_from(">II", data, at + 20)
+        body = at + 28 + name_size
+        if data[at + 28 : body] == channel.encode():
+            kind = getattr(equipoise, {"SENSORS": "sensors_t", "MOTORS": "motors_t"}[channel[10:]])
+            message = kind.decode(bytes(data[body : body + size]))
+            if message.tick == tick:
+                change(message)
+                data[body : body + size] = message.encode()
+        at = body + size
+    log.write_bytes(data)
+
+
+def test_replay_names_the_first_field_and_tick_that_differ(root, tmp_path):
+    log = simulate(root, tmp_path / "run.lcm")
+
+    def last_bit(message):
+        duty = list(message.duty)
+        duty[1] = float(np.nextafter(duty[1], 2.0))
+        message.duty = duty
+
+    rewrite(log, "EQUIPOISE_MOTORS", 700, last_bit)
+    status, result = replay(root, log)
+    assert status == 1 and not result["identical"]
+    assert (result["first_difference"]["tick"], result["first_difference"]["field"]) == (
+        700,
+        "EQUIPOISE_MOTORS.duty[1]",
+    )
+
+
+def test_a_changed_sensor_shows_in_the_estimate_of_its_tick(root, tmp_path):
+    log = simulate(root, tmp_path / "run.lcm")
+
+    def one_count(message):
+        message.gyro_counts = [message.gyro_counts[0] + 1.0, *message.gyro_counts[1:]]
+
+    rewrite(log, "EQUIPOISE_SENSORS", 500, one_count)
+    difference = replay(root, log)[1]["first_difference"]
+    assert difference["tick"] == 500
+    assert difference["field"].startswith("EQUIPOISE_STATE.")
+
+
+def test_another_filter_is_tried_on_the_same_flight(root, tmp_path):
+    compared = tmp_path / "compared.json"
+    log = simulate(
+        root, tmp_path / "run.lcm", "--yaw-hz", "0.75", "--compare", "--json", compared, seconds=20
+    )
+    status, result = replay(root, log, "--estimator", "ekf13_published")
+    assert status == 0 and result["identical"]
+    simulated = json.loads(compared.read_text())["estimators"]
+    for name in ("ekf", "ekf13_published"):
+        assert result["errors"][name]["attitude_rmse_rad"] == pytest.approx(
+            simulated[name]["attitude_rmse_rad"], rel=1e-3
+        )
+    assert (
+        result["errors"]["ekf"]["attitude_rmse_rad"]
+        < result["errors"]["ekf13_published"]["attitude_rmse_rad"]
+    )
+
+
+@pytest.mark.parametrize("keep", [0.0, 0.3, 0.9, 0.999])
+def test_a_truncated_log_replays_up_to_the_cut(root, tmp_path, keep):
+    log = simulate(root, tmp_path / "run.lcm")
+    whole = log.read_bytes()
+    log.write_bytes(whole[: max(7000, int(keep * len(whole)))])
+    ended = equipoise_run(root, "replay", log, "--json", "-")
+    if keep == 0.0:
+        assert ended.returncode == 2 and str(log) in ended.stderr
+        return
+    result = json.loads(ended.stdout)
+    assert ended.returncode == 0 and result["identical"]
+    assert result["ticks"] >= keep * 1200 - 3
+
+
+def test_what_is_no_log_is_refused(root, tmp_path):
+    (tmp_path / "a.lcm").write_bytes(b"\xed\xa1\xda\x01" * 100)
+    for path in (tmp_path / "a.lcm", tmp_path / "none.lcm", root / "config/mbbr.toml"):
+        ended = equipoise_run(root, "replay", path)
+        assert ended.returncode == 2
+        assert ended.stderr.startswith(f"equipoise: {path}: ") and ended.stderr.count("\n") == 1
+
+
+def start_lockstep(root, tmp_path, *arguments):
+    path = tmp_path / "io.sock"
+    command = [
+        root / "build/host/equipoise",
+        "run",
+        "--config",
+        root / "config/mbbr.toml",
+        "--telemetry",
+        "off",
+    ]
+    command += ["--backend", "lockstep", "--socket", path, "--log", tmp_path / "run.lcm"]
+    process = subprocess.Popen(list(map(str, [*command, *arguments])), stderr=subprocess.DEVNULL)
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    connection.settimeout(30)
+    while True:
+        try:
+            connection.connect(str(path))
+            return process, connection
+        except (FileNotFoundError, ConnectionRefusedError):
+            assert process.poll() is None
+            time.sleep(0.005)
+
+
+@pytest.mark.slow
+def test_sigkill_at_any_time_leaves_a_readable_log_that_lost_less_than_100_ms(root, tmp_path):
+    """200 kills of a robot in real time. Lost: between the last answered step and the log's end."""
+    chance = random.Random(6)
+    lost_ms = []
+    message = Robot(0.0).sensors(0)
+    for kill in range(200):
+        folder = tmp_path / str(kill)
+        folder.mkdir()
+        process, connection = start_lockstep(root, folder)
+        steps = chance.randrange(1, 40)
+        with connection:
+            started = time.monotonic()
+            for step in range(steps):
+                message.step, message.t_s = step, 0.005 * step
+                connection.send(message.encode())
+                connection.recv(512)
+                time.sleep(max(0.0, started + 0.005 * (step + 1) - time.monotonic()))
+            time.sleep(chance.random() * 0.004)
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+        log = read_log(folder / "run.lcm")
+        whole = len(log["EQUIPOISE_TIMING"]) if "EQUIPOISE_TIMING" in log else 0
+        assert "EQUIPOISE_RUN" in log
+        lost_ms.append(5.0 * (steps - whole))
+    assert len(lost_ms) == 200
+    assert max(lost_ms) <= 100.0, sorted(lost_ms)[-10:]
+    print(f"200 kills: at most {max(lost_ms):.0f} ms lost, mean {np.mean(lost_ms):.1f} ms")
+
+
+def test_a_large_log_goes_on_in_further_files_and_replays_as_one(root, tmp_path):
+    process, connection = start_lockstep(root, tmp_path, "--log-max-mb", "1")
+    robot = Robot(0.0)
+    with connection:
+        for step in range(2000):
+            message = robot.sensors(step)
+            message.last = step == 1999
+            connection.send(message.encode())
+            connection.recv(512)
+    process.wait(timeout=30)
+    parts = sorted(tmp_path.glob("run*.lcm"))
+    assert [part.name for part in parts] == ["run.0001.lcm", "run.lcm"]
+    assert all(read_log(part)["EQUIPOISE_RUN"][0].robot == "mbbr" for part in parts)
+    status, result = replay(root, tmp_path / "run.lcm")
+    assert status == 0 and result["ticks"] == 2000 and result["identical"]
+
+
+def test_a_short_disk_costs_the_oldest_files_then_stops_the_run(root, tmp_path):
+    process, connection = start_lockstep(root, tmp_path, "--log-min-free-mb", "1000000")
+    robot = Robot(0.0)
+    with connection:
+        last = False
+        for step in range(1000):
+            connection.send(robot.sensors(step).encode())
+            last = equipoise.lockstep_motors_t.decode(connection.recv(512)).last
+            if last:
+                break
+    assert last
+    assert process.wait(timeout=30) == 1
+    assert read_log(tmp_path / "run.lcm").notes == []
+
+
+def test_csv_holds_the_same_numbers(root, tmp_path):
+    log = simulate(root, tmp_path / "run.lcm", seconds=2)
+    assert equipoise_run(root, "convert", log, "--to", "csv").returncode == 0
+    rows = list(csv.DictReader((tmp_path / "run.csv").open()))
+    state = read_log(log)["EQUIPOISE_STATE"]
+    motors = read_log(log)["EQUIPOISE_MOTORS"]
+    assert [int(row["tick"]) for row in rows] == state["tick"].tolist()
+    assert [float(row["state.theta_rad_1"]) for row in rows] == state["theta_rad"][:, 1].tolist()
+    assert [float(row["motors.duty_2"]) for row in rows] == motors["duty"][:, 2].tolist()
+
+
+def test_mcap_holds_the_same_numbers(root, tmp_path):
+    log = simulate(root, tmp_path / "run.lcm", seconds=2)
+    assert equipoise_run(root, "convert", log, "--to", "mcap").returncode == 0
+    reader = pytest.importorskip("mcap.reader")
+    with (tmp_path / "run.mcap").open("rb") as stream:
+        messages = list(reader.NonSeekingReader(stream).iter_messages(topics=["equipoise/state"]))
+    state = read_log(log)["EQUIPOISE_STATE"]
+    assert len(messages) == len(state)
+    for i in (0, 200, len(state) - 1):
+        schema, channel, message = messages[i]
+        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+        assert message.log_time == 1000 * int(state["utime"][i])
+        assert json.loads(message.data)["theta_rad_0"] == state["theta_rad"][i, 0]
+
+
+def test_convert_says_what_it_cannot_do(root, tmp_path):
+    for arguments, complaint in [
+        ([tmp_path / "none.lcm", "--to", "csv"], "none.lcm: cannot be read"),
+        ([tmp_path / "none.lcm", "--to", "xls"], "--to"),
+    ]:
+        ended = equipoise_run(root, "convert", *arguments)
+        assert ended.returncode == 2 and complaint in ended.stderr
