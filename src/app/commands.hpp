@@ -19,6 +19,7 @@ void add_sim(CLI::App& app, int* status);
 void add_model(CLI::App& app, int* status);
 void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);
+void add_attitude(CLI::App& app, int* status);
 void add_motor_bench(CLI::App& app, int* status);
 
 /// Reads a JSON file; InputError names it.
