@@ -27,7 +27,7 @@ TYPED_TEST(EncoderCheckOnRobot, FindsAReversedEncoderAndNamesTheWheel) {
       const FlightEnd end = fly_with<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 2.0,
                                                 [&](RawSample& raw) { raw.encoder_counts[wheel] *= -1.0; });
       EXPECT_EQ(end.arm_state, ArmState::kFault) << "wheel " << wheel << " seed " << seed;
-      EXPECT_TRUE(end.reasons & kEncoderReversed) << "wheel " << wheel << " seed " << seed;
+      EXPECT_TRUE(end.reasons & kEncoderSign) << "wheel " << wheel << " seed " << seed;
       EXPECT_TRUE(end.reasons & (kWheelOne << wheel)) << "wheel " << wheel << " seed " << seed;
       EXPECT_LE(end.ended_at_s, 0.5);
     }
