@@ -52,15 +52,14 @@ def main(arguments=None) -> int:
     parser.add_argument("--check", action="store_true", help="compare only; exit 1 when a file is stale")
     parser.add_argument("--output", type=Path, default=DEFAULT_FOLDER, help="folder of the headers")
     options = parser.parse_args(arguments)
-    if options.check:
-        found = stale(options.output)
-        for problem in found:
-            print(f"{problem}; run python3 -m tools.derive", file=sys.stderr)
-        return 1 if found else 0
-    options.output.mkdir(parents=True, exist_ok=True)
-    for name, render in TARGETS.items():
-        (options.output / name).write_text(render(), encoding="utf-8")
-        print(f"wrote {options.output / name}")
+    found = stale(options.output) if options.check else []
+    for problem in found:
+        print(f"{problem}; run python3 -m tools.derive", file=sys.stderr)
+    if not options.check:
+        options.output.mkdir(parents=True, exist_ok=True)
+        for name, render in TARGETS.items():
+            (options.output / name).write_text(render(), encoding="utf-8")
+            print(f"wrote {options.output / name}")
     for report in REPORTS:
         print("\n".join(report()))
-    return 0
+    return 1 if found else 0
