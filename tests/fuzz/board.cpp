@@ -11,7 +11,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const equipoise::app::Board board =
         equipoise::app::parse_board(std::string(reinterpret_cast<const char*>(data), size), "fuzz.toml");
     const bbb_config_t& w = board.wiring;
-    if (w.motors < 1 || w.motors > RIO_MAX_MOTORS || w.pwm_hz == 0 || w.battery_every_ticks == 0) std::abort();
+    if (w.motors < 1 || w.motors > RIO_MAX_MOTORS || w.pwm_hz == 0 || w.battery_every_ticks == 0)
+      std::abort();
     if (strnlen(w.imu.bus, sizeof w.imu.bus) == sizeof w.imu.bus) std::abort();
     if (strnlen(w.adc, sizeof w.adc) == sizeof w.adc) std::abort();
   } catch (const equipoise::ConfigError&) {

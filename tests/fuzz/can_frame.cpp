@@ -1,8 +1,8 @@
 // Any frame, error frames included, leaves the port in one of its four states.
-#include "can.h"
-
 #include <cstdlib>
 #include <cstring>
+
+#include "can.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   can_port_t port{};

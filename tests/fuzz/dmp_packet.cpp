@@ -1,8 +1,8 @@
 // Any packet is refused or holds a unit quaternion.
-#include "dmp.h"
-
 #include <cmath>
 #include <cstdlib>
+
+#include "dmp.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   dmp_packet_t packet;

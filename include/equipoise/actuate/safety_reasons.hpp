@@ -38,13 +38,34 @@ enum SafetyReason : std::uint32_t {
   kWheelFour = 1u << 27,
 };
 
-inline constexpr std::array<const char*, 28> kSafetyReasonNames{
-    "not_requested",       "tilt",           "imu_stale",        "encoder_stale",  "not_finite",
-    "battery_low",         "attitude_stale", "gyro_moving",      "not_calibrated", "encoder_sign",
-    "estimator_unhealthy", "command_stale",  "realtime_missing", "guard_dead",     "overrun",
-    "picked_up",           "stall",          "saturated",        "wheel_slip",     "encoder_jump",
-    "bridge_fault",        "write_failed",   "log_failed",       "encoder_stuck",  "wheel_1",
-    "wheel_2",             "wheel_3",        "wheel_4"};
+inline constexpr std::array<const char*, 28> kSafetyReasonNames{"not_requested",
+                                                                "tilt",
+                                                                "imu_stale",
+                                                                "encoder_stale",
+                                                                "not_finite",
+                                                                "battery_low",
+                                                                "attitude_stale",
+                                                                "gyro_moving",
+                                                                "not_calibrated",
+                                                                "encoder_sign",
+                                                                "estimator_unhealthy",
+                                                                "command_stale",
+                                                                "realtime_missing",
+                                                                "guard_dead",
+                                                                "overrun",
+                                                                "picked_up",
+                                                                "stall",
+                                                                "saturated",
+                                                                "wheel_slip",
+                                                                "encoder_jump",
+                                                                "bridge_fault",
+                                                                "write_failed",
+                                                                "log_failed",
+                                                                "encoder_stuck",
+                                                                "wheel_1",
+                                                                "wheel_2",
+                                                                "wheel_3",
+                                                                "wheel_4"};
 
 /// Calls `with(name)` for every bit that is set.
 template <class With>

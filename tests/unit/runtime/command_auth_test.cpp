@@ -61,9 +61,13 @@ TEST(CommandGate, TakesNoneOfAThousandForgedOrReplayedCommands) {
   for (int i = 0; i < 1000; ++i) {
     signed_command_t m = heard[pick(heard.size())];  // 0: replayed as it was
     switch (i % 8) {
-      case 1: m = command_for(gate, 1000 + i, key_of(2)); break;  // another key
-      case 2: m.sequence = 1000 + i; break;                       // renumbered
-      case 3:                                                     // one bit of the mac turned
+      case 1:
+        m = command_for(gate, 1000 + i, key_of(2));
+        break;  // another key
+      case 2:
+        m.sequence = 1000 + i;
+        break;  // renumbered
+      case 3:   // one bit of the mac turned
         m = command_for(gate, 1000 + i, key);
         m.mac[pick(sizeof m.mac)] ^= static_cast<std::uint8_t>(1U << pick(8));
         break;
@@ -75,12 +79,15 @@ TEST(CommandGate, TakesNoneOfAThousandForgedOrReplayedCommands) {
         m = command_for(gate, 1000 + i, key);
         m.arm = 0;
         break;
-      case 6: m = command_for(earlier, 1000 + i, key); break;  // recorded in another session
-      case 7:                                                  // noise
+      case 6:
+        m = command_for(earlier, 1000 + i, key);
+        break;  // recorded in another session
+      case 7:   // noise
         for (std::uint8_t& byte : m.mac) byte = static_cast<std::uint8_t>(random());
         m.sequence = 1000 + i;
         break;
-      default: break;
+      default:
+        break;
     }
     accepted += gate.accept(m, &c) ? 1 : 0;
   }
