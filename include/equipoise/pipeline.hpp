@@ -84,7 +84,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     SafetyInputs checks = safety_inputs(raw, asked, t, faults);
     checks.imu_gap = fresh.imu_gap;
     checks.encoder_jump = fresh.encoder_jump;
-    checks.slip_rad_s = slip_rad_s<Robot>(t, kinematics_.axis_rates(t.z.wheel_rate_rad_s), 0);
+    checks.slip_rad_s = slip_rad_s<Robot>(t, kinematics_, 0);
     checks.inhibit = inhibit;
     t.motors = safety_.gate(duty, checks);
     t.arm_state = safety_.state();
@@ -174,12 +174,12 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   /// Encoders against gyro, of robots that can tell.
   template <class R>
-  static auto slip_rad_s(const Result& t, const Input& axis_rates, int) noexcept
-      -> decltype(R::slip_rad_s(t.z, axis_rates, t.x_hat)) {
-    return R::slip_rad_s(t.z, axis_rates, t.x_hat);
+  static auto slip_rad_s(const Result& t, const typename R::Kinematics& kinematics, int) noexcept
+      -> decltype(R::slip_rad_s(t.z, kinematics, t.x_hat)) {
+    return R::slip_rad_s(t.z, kinematics, t.x_hat);
   }
   template <class R>
-  static double slip_rad_s(const Result&, const Input&, long) noexcept {
+  static double slip_rad_s(const Result&, const typename R::Kinematics&, long) noexcept {
     return 0.0;
   }
 

@@ -155,6 +155,7 @@ void complete(Choice& choice) {
 template <class Firmware>
 runtime::RunInfo run_info(const typename Firmware::Loaded& loaded, const Choice& choice, std::int64_t seed) {
   runtime::RunInfo run;
+  run.attitude = choice.attitude;
   run.robot = Firmware::kName;
   run.estimator = choice.estimator;
   run.controller = choice.controller;

@@ -149,6 +149,7 @@ class Telemetry::Writer {
     m.config_toml = run.config_toml;
     m.backend = run.backend;
     m.board_toml = run.board_toml;
+    m.attitude = run.attitude;
     encode(m);
     log_.preamble(utime_, "EQUIPOISE_RUN", buffer_);
     if (lcm_ != nullptr)

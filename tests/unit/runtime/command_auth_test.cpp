@@ -149,7 +149,7 @@ TEST_F(KeyFile, ThatOthersMayReadIsRefusedWithTheFix) {
 
 TEST_F(KeyFile, ThatIsNoKeyIsRefused) {
   EXPECT_NE(complaint().find("equipoise keygen"), std::string::npos);  // missing
-  for (const std::string text : {std::string(), std::string("secret\n"), std::string(64, 'g'),
+  for (const std::string& text : {std::string(), std::string("secret\n"), std::string(64, 'g'),
                                  std::string(63, 'a'), std::string(66, 'a')}) {
     std::ofstream(path_) << text;
     ASSERT_EQ(chmod(path_.c_str(), 0600), 0);
