@@ -222,11 +222,11 @@ std::optional<std::size_t> index_of(const std::string& estimator) {
 
 template <class Firmware>
 int run(const Arguments& a, const FlightLog& log) {
-  Choice choice{log.run.estimator, log.run.controller, log.run.fidelity, false};
+  Choice choice{log.run.estimator, log.run.controller, log.run.fidelity, false, log.run.attitude};
   complete<Firmware>(choice);
   std::optional<std::size_t> other;
   if (!a.estimator.empty()) {
-    Choice asked{a.estimator, log.run.controller, "", false};
+    Choice asked{a.estimator, log.run.controller, "", false, ""};
     complete<Firmware>(asked);
     other = index_of<Firmware>(a.estimator);
     choice.compare = true;

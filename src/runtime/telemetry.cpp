@@ -149,6 +149,7 @@ class Telemetry::Writer {
     m.config_toml = run.config_toml;
     m.backend = run.backend;
     m.board_toml = run.board_toml;
+    m.attitude = run.attitude;
     encode(m);
     log_.preamble(utime_, "EQUIPOISE_RUN", buffer_);
     if (lcm_ != nullptr)
@@ -175,6 +176,7 @@ class Telemetry::Writer {
     m.yaw_rate_rad_s = r.yaw_rate_rad_s;
     m.arm = r.arm ? 1 : 0;
     m.heading_reset = r.heading_reset ? 1 : 0;
+    m.age_s = r.command_age_s;
     emit("EQUIPOISE_COMMAND", m);
   }
 
@@ -200,6 +202,7 @@ class Telemetry::Writer {
     m.reasons = static_cast<std::int32_t>(r.reasons);
     m.sensor_health = static_cast<std::int32_t>(r.raw.health);
     m.battery_V = r.battery_V;
+    m.inhibit = static_cast<std::int32_t>(r.inhibit);
     emit("EQUIPOISE_HEALTH", m);
   }
 

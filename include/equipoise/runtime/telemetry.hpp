@@ -33,6 +33,7 @@ struct RunInfo {
   std::string config_toml;
   std::string backend;     // sim, board, lockstep
   std::string board_toml;  // on hardware, the wiring
+  std::string attitude;    // source: dmp, own; empty: as configured
 };
 
 struct TelemetryOptions {
