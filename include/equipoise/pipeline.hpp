@@ -80,7 +80,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.u_friction = t.u_lin + friction;            // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
     const EncoderFaults faults =
-        encoder_check_.update(safety_.armed(), duty_previous_, t.z.wheel_angle_rad, t.z.wheel_rate_rad_s);
+        encoder_check_.update(safety_.armed(), drive_previous_, t.z.wheel_angle_rad, t.z.wheel_rate_rad_s);
     SafetyInputs checks = safety_inputs(raw, asked, t, faults);
     checks.imu_gap = fresh.imu_gap;
     checks.encoder_jump = fresh.encoder_jump;
@@ -92,7 +92,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.inhibit = inhibit;
 
     u_previous_ = applied_input(t, friction);
-    duty_previous_ = wheel_duty(t.motors);
+    drive_previous_ = wheel_drive(t);
     return t;
   }
 
@@ -126,14 +126,10 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     return kinematics_.axes_from_wheels(limited) - friction;
   }
 
-  /// Duties in the wheels' sense.
-  Wheels wheel_duty(const MotorCommand& motors) const noexcept {
-    Wheels duty;
-    for (int i = 0; i < Robot::kWheels; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      duty(i) = p_.calibration.motor_sign[k] * motors.duty[k];
-    }
-    return duty;
+  /// What drives each wheel, of a linear bridge: a coasting bridge's duty says little about its torque.
+  Wheels wheel_drive(const Result& t) const noexcept {
+    if (!t.motors.enable) return Wheels::Zero();
+    return kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-1.0).cwiseMin(1.0);
   }
 
   SafetyInputs safety_inputs(const RawSample& raw, const Command& command, const Result& t,
@@ -202,7 +198,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Safety safety_;
   AttitudeFilter attitude_;
   EncoderCheck<Robot::kWheels> encoder_check_;
-  Wheels duty_previous_ = Wheels::Zero();
+  Wheels drive_previous_ = Wheels::Zero();
   Input u_previous_ = Input::Zero();
 };
 

@@ -49,10 +49,11 @@ std::uint32_t Safety::check_sensors(const SafetyInputs& in) noexcept {
       battery_unknown_ >= kBatteryUnknownTicks) {
     reasons |= kBatteryLow;
   }
-  // Only a driven robot shows what its encoders are worth.
-  if (armed() && in.encoders_stuck != 0) reasons |= kEncoderStuck;
-  if (armed() && in.encoders_reversed != 0) reasons |= kEncoderSign;
-  if (armed()) reasons |= (in.encoders_stuck | in.encoders_reversed) * kWheelOne;
+  if (p_.encoder_check && armed()) {  // only a driven robot shows what its encoders are worth
+    if (in.encoders_stuck != 0) reasons |= kEncoderStuck;
+    if (in.encoders_reversed != 0) reasons |= kEncoderSign;
+    reasons |= (in.encoders_stuck | in.encoders_reversed) * kWheelOne;
+  }
   return reasons;
 }
 

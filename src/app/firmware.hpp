@@ -23,7 +23,7 @@ struct Choice {
   std::string controller;
   std::string fidelity;  // of the simulated world; empty on hardware
   bool compare = false;
-  std::string attitude;  // dmp or own; empty: as configured
+  std::string attitude{};  // dmp or own; empty: as configured
 };
 
 /// Index of a name of kFidelityNames; ConfigError when it is none.

@@ -39,6 +39,7 @@ struct SafetyParams {
   double min_battery_V = 6.0;     // for half a second: two LiPo cells
   double cutoff_battery_V = 5.5;  // for five ticks: the supply is going
   double max_innovation = 100.0;  // normalised innovation, mean over about ten ticks; back below a half: well
+  bool encoder_check = true;      // stuck or reversed, over the first half second after arming
   double max_slip_rad_s = 8.0;    // encoders against gyro, where the robot tells; mean over about ten ticks
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
   double max_saturated_s = 0.5;        // without a break
