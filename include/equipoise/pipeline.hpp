@@ -59,7 +59,8 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         bridge_(p.motor),
         freshness_(freshness_params(p)),
         safety_(p.safety),
-        attitude_(p.attitude) {}
+        attitude_(p.attitude),
+        encoder_check_(p.safety.encoder_check_drive) {}
 
   /// `inhibit`: SafetyReason bits of the runtime (guard, overruns, ...) that forbid motors.
   Result tick(const RawSample& raw, const Command& asked, std::uint32_t inhibit = 0) noexcept {
@@ -75,12 +76,11 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
     if (!safety_.armed()) reference_.reset(t.x_hat);
     t.ref = reference_.update(command, t.x_hat);  // [T] 6.2.1
-    t.u_lin = feedback_.update(t.ref);            // [T] (6.10)
+    const EncoderFaults faults = encoder_check_.update(safety_.armed(), t.z.wheel_angle_rad);
+    t.u_lin = feedback_.update(t.ref) + kinematics_.axes_from_wheels(encoder_check_.drive());  // [T] (6.10)
     const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);
     t.u_friction = t.u_lin + friction;            // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
-    const EncoderFaults faults =
-        encoder_check_.update(safety_.armed(), drive_previous_, t.z.wheel_angle_rad, t.z.wheel_rate_rad_s);
     SafetyInputs checks = safety_inputs(raw, asked, t, faults);
     checks.imu_gap = fresh.imu_gap;
     checks.encoder_jump = fresh.encoder_jump;
@@ -92,7 +92,6 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.inhibit = inhibit;
 
     u_previous_ = applied_input(t, friction);
-    drive_previous_ = wheel_drive(t);
     return t;
   }
 
@@ -124,12 +123,6 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     const double share = bridge_.supply_V(t.z.battery_V, t.z.battery_ok) / p_.motor.nominal_V;
     const Wheels limited = kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-share).cwiseMin(share);
     return kinematics_.axes_from_wheels(limited) - friction;
-  }
-
-  /// What drives each wheel, of a linear bridge: a coasting bridge's duty says little about its torque.
-  Wheels wheel_drive(const Result& t) const noexcept {
-    if (!t.motors.enable) return Wheels::Zero();
-    return kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-1.0).cwiseMin(1.0);
   }
 
   SafetyInputs safety_inputs(const RawSample& raw, const Command& command, const Result& t,
@@ -198,7 +191,6 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Safety safety_;
   AttitudeFilter attitude_;
   EncoderCheck<Robot::kWheels> encoder_check_;
-  Wheels drive_previous_ = Wheels::Zero();
   Input u_previous_ = Input::Zero();
 };
 

@@ -49,7 +49,7 @@ std::uint32_t Safety::check_sensors(const SafetyInputs& in) noexcept {
       battery_unknown_ >= kBatteryUnknownTicks) {
     reasons |= kBatteryLow;
   }
-  if (p_.encoder_check && armed()) {  // only a driven robot shows what its encoders are worth
+  if (armed()) {  // only a driven robot shows what its encoders are worth
     if (in.encoders_stuck != 0) reasons |= kEncoderStuck;
     if (in.encoders_reversed != 0) reasons |= kEncoderSign;
     reasons |= (in.encoders_stuck | in.encoders_reversed) * kWheelOne;
@@ -62,7 +62,8 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   const double nis = std::min(std::abs(in.state.normalized_innovation), kLargestInnovation);
   if (std::isfinite(nis)) innovation_ += kMean * (nis - innovation_);
   if (std::isfinite(in.slip_rad_s)) slip_ += kMean * (in.slip_rad_s - slip_);
-  unhealthy_ = innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation;
+  surprised_ = count(surprised_, !(innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation));
+  unhealthy_ = surprised_ > (unhealthy_ ? 0 : ticks(p_.max_innovation_s));
   falling_ = count(falling_, !(in.imu_ok && in.accel_m_s2 < kFreeFall_m_s2));
   const double fastest =
       std::abs(*std::max_element(in.wheel_rate_rad_s.begin(), in.wheel_rate_rad_s.end(),

@@ -1,10 +1,13 @@
-// Do the encoders show what the motors do? Watched over the first half second after arming.
-// In: armed, duties at the wheels, encoder angles and rates -> out: per wheel, stuck or reversed. A wheel
-// that is driven beyond friction must move; its rate must change with its duty, not against it: wheels and
-// motors are collocated, so this holds for any robot and any controller. RT-safe.
+// Do the encoders show what the motors do? Right after arming each wheel in turn is shaken for 60 ms, forth,
+// back and forth, which moves the robot nowhere; its encoder must follow.
+// In: armed, encoder angles -> out: a drive to add at the wheels; per wheel, stuck or reversed. Verdicts fall
+// before kTicks; afterwards, and disarmed, nothing is added. Motor and encoder are on one shaft: that it
+// follows holds for any robot and any controller. RT-safe.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "equipoise/types.hpp"
@@ -19,77 +22,106 @@ struct EncoderFaults {
 template <int N>
 class EncoderCheck {
  public:
-  static constexpr int kWindow = 100;  // ticks, 0.5 s
+  static constexpr int kStroke = 3;           // ticks forth, twice as many back, as many forth
+  static constexpr int kShake = 4 * kStroke;  // 60 ms
+  static constexpr int kWindow = kShake + 4;  // and the answer to its last tick
+  static constexpr int kTicks = N * kWindow;  // after arming: 0.16 s of two wheels, 0.24 s of three
 
-  EncoderFaults update(bool armed, const Vec<N>& duty, const Vec<N>& angle_rad,
-                       const Vec<N>& rate_rad_s) noexcept {
-    if (!armed) {
-      *this = EncoderCheck{};
-      angle_previous_ = angle_rad;
-      return {};
-    }
-    if (ticks_ >= kWindow || !duty.allFinite() || !angle_rad.allFinite()) return {};
-    ++ticks_;
-    for (std::size_t i = kHistory - 1; i > 0; --i) {
-      duties_[i] = duties_[i - 1];
-      rates_[i] = rates_[i - 1];
-    }
-    duties_[0] = duty;
-    rates_[0] = rate_rad_s;
-    travel_ += (angle_rad - angle_previous_).cwiseAbs();
-    angle_previous_ = angle_rad;
-    effort_ += (duty.cwiseAbs().array() - kBreakaway).cwiseMax(0.0).matrix();
-    if (ticks_ > static_cast<int>(kHistory)) correlate();
+  /// `drive`: of full duty, more than friction takes, less than throws the robot; 0: no check.
+  explicit EncoderCheck(double drive) : drive_(drive), answer_(expected_answer()) {}
 
-    EncoderFaults faults;
-    for (int i = 0; i < N; ++i) {
-      if (effort_(i) > kStuckEffort && travel_(i) < kStuckTravel_rad) faults.stuck |= 1U << i;
-      if (ticks_ >= kFirstVerdict &&
-          both_(i) < -kAgainst * std::sqrt(duty_squared_(i) * change_squared_(i)) &&
-          duty_squared_(i) > kEnoughDuty * kEnoughDuty &&
-          change_squared_(i) > kEnoughChange * kEnoughChange) {
-        faults.reversed |= 1U << i;
-      }
+  /// What to add to the wheels' drives in this tick.
+  Vec<N> drive() const noexcept {
+    Vec<N> drive = Vec<N>::Zero();
+    if (running_) drive(tick_ / kWindow) = drive_ * sense(tick_ % kWindow);
+    return drive;
+  }
+
+  EncoderFaults update(bool armed, const Vec<N>& angle_rad) noexcept {
+    if (!armed || !(drive_ > 0.0)) {
+      running_ = false;
+      tick_ = -1;
+      faults_ = {};
+      return faults_;
     }
-    return faults;
+    if (tick_ + 1 > kTicks) return faults_;
+    ++tick_;
+    if (tick_ > 0) {
+      const int wheel = (tick_ - 1) / kWindow;
+      const int sample = (tick_ - 1) % kWindow;
+      angles_[static_cast<std::size_t>(sample)] = angle_rad(wheel);
+      if (sample == kWindow - 1) judge(wheel);
+    }
+    running_ = tick_ < kTicks;
+    return faults_;
   }
 
  private:
-  /// A rate is the slope over six samples, 2.5 ticks old: the change of the last five ticks answers the
-  /// duties of ticks 8 to 3 ago.
-  void correlate() noexcept {
-    const Vec<N> change = rates_[0] - rates_[5];
-    const Vec<N> push =
-        0.5 * duties_[7] + duties_[6] + duties_[5] + duties_[4] + duties_[3] + 0.5 * duties_[2];
-    both_ += change.cwiseProduct(push);
-    duty_squared_ += push.cwiseProduct(push);
-    change_squared_ += change.cwiseProduct(change);
+  using Samples = std::array<double, static_cast<std::size_t>(kWindow)>;
+
+  static double sense(int tick) noexcept {
+    if (tick >= kShake) return 0.0;
+    return tick < kStroke || tick >= 3 * kStroke ? 1.0 : -1.0;
   }
 
-  static constexpr std::size_t kHistory = 9;
-  static constexpr double kBreakaway = 0.15;   // duty that overcomes any healthy gear's friction
-  static constexpr double kStuckEffort = 1.0;  // duty beyond it, times ticks
+  void judge(int wheel) noexcept {
+    Samples moved = angles_;
+    remove_drift(moved);
+    const auto [low, high] = std::minmax_element(angles_.begin(), angles_.end());
+    const double alike = dot(moved, answer_) / std::sqrt(dot(moved, moved) * dot(answer_, answer_) + 1e-300);
+    if (*high - *low < kStuckTravel_rad) {
+      faults_.stuck |= 1U << wheel;
+    } else if (alike < -kAgainst) {
+      faults_.reversed |= 1U << wheel;
+    }
+  }
+
+  /// Angle of a wheel with inertia under the drive, without what a balancing robot does meanwhile.
+  static Samples expected_answer() noexcept {
+    Samples angle{};
+    double speed = 0.0;
+    double travelled = 0.0;
+    for (int i = 0; i < kWindow; ++i) {
+      angle[static_cast<std::size_t>(i)] = travelled;
+      travelled += speed;
+      speed += sense(i);
+    }
+    remove_drift(angle);
+    return angle;
+  }
+
+  static double dot(const Samples& a, const Samples& b) noexcept {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+    return sum;
+  }
+
+  /// Takes out the least-squares cubic: two steps of Gram-Schmidt per degree.
+  static void remove_drift(Samples& samples) noexcept {
+    std::array<Samples, 4> basis{};
+    for (std::size_t degree = 0; degree < basis.size(); ++degree) {
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        const double t = 2.0 * static_cast<double>(i) / (kWindow - 1) - 1.0;
+        basis[degree][i] = std::pow(t, static_cast<int>(degree));
+      }
+      for (std::size_t lower = 0; lower < degree; ++lower) subtract(basis[degree], basis[lower]);
+      subtract(samples, basis[degree]);
+    }
+  }
+  static void subtract(Samples& samples, const Samples& direction) noexcept {
+    const double share = dot(samples, direction) / dot(direction, direction);
+    for (std::size_t i = 0; i < samples.size(); ++i) samples[i] -= share * direction[i];
+  }
+
   static constexpr double kStuckTravel_rad = 0.02;
-  static constexpr int kFirstVerdict = 60;
-  static constexpr double kAgainst = 0.6;       // correlation
-  static constexpr double kEnoughDuty = 1.5;    // root of the sum of squares
-  static constexpr double kEnoughChange = 5.0;  // rad/s
+  static constexpr double kAgainst = 0.5;  // correlation
 
-  int ticks_ = 0;
-  std::array<Vec<N>, kHistory> duties_ = filled();
-  std::array<Vec<N>, kHistory> rates_ = filled();
-  Vec<N> angle_previous_ = Vec<N>::Zero();
-  Vec<N> travel_ = Vec<N>::Zero();
-  Vec<N> effort_ = Vec<N>::Zero();
-  Vec<N> both_ = Vec<N>::Zero();
-  Vec<N> duty_squared_ = Vec<N>::Zero();
-  Vec<N> change_squared_ = Vec<N>::Zero();
-
-  static std::array<Vec<N>, kHistory> filled() noexcept {
-    std::array<Vec<N>, kHistory> zeros;
-    zeros.fill(Vec<N>::Zero());
-    return zeros;
-  }
+  double drive_;
+  Samples answer_;
+  Samples angles_{};
+  bool running_ = false;
+  int tick_ = -1;
+  EncoderFaults faults_;
 };
 
 }  // namespace equipoise

@@ -38,9 +38,10 @@ struct SafetyParams {
   bool needs_attitude = false;
   double min_battery_V = 6.0;     // for half a second: two LiPo cells
   double cutoff_battery_V = 5.5;  // for five ticks: the supply is going
-  double max_innovation = 100.0;  // normalised innovation, mean over about ten ticks; back below a half: well
-  bool encoder_check = true;      // stuck or reversed, over the first half second after arming
-  double max_slip_rad_s = 8.0;    // encoders against gyro, where the robot tells; mean over about ten ticks
+  double max_innovation = 5.0;    // normalised innovation, mean over about ten ticks; back below a half: well
+  double max_innovation_s = 0.1;  // above it for longer: longer than a push lasts
+  double encoder_check_drive = 0.3;  // shakes each wheel right after arming; 0: encoders are not checked
+  double max_slip_rad_s = 8.0;  // encoders against gyro, where the robot tells; mean over about ten ticks
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
   double max_saturated_s = 0.5;        // without a break
   double max_stall_s = 0.3;            // a wheel that stands still at nearly full duty
@@ -105,6 +106,7 @@ class Safety {
   std::array<int, kMaxMotors> stalled_{};
   double innovation_ = 0.0;
   double slip_ = 0.0;
+  int surprised_ = 0;
   bool unhealthy_ = false;
 };
 
