@@ -76,7 +76,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
     if (!safety_.armed()) reference_.reset(t.x_hat);
     t.ref = reference_.update(command, t.x_hat);  // [T] 6.2.1
-    const EncoderFaults faults = encoder_check_.update(safety_.armed(), t.z.wheel_angle_rad);
+    const EncoderFaults faults = encoder_check_.update(safety_.armed(), duty_previous_, t.z.wheel_angle_rad);
     t.u_lin = feedback_.update(t.ref) + kinematics_.axes_from_wheels(encoder_check_.drive());  // [T] (6.10)
     const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);
     t.u_friction = t.u_lin + friction;            // [T] 6.2.2
@@ -92,6 +92,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.inhibit = inhibit;
 
     u_previous_ = applied_input(t, friction);
+    duty_previous_ = wheel_duty(t.motors);
     return t;
   }
 
@@ -123,6 +124,16 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     const double share = bridge_.supply_V(t.z.battery_V, t.z.battery_ok) / p_.motor.nominal_V;
     const Wheels limited = kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-share).cwiseMin(share);
     return kinematics_.axes_from_wheels(limited) - friction;
+  }
+
+  /// Duties in the wheels' sense.
+  Wheels wheel_duty(const MotorCommand& motors) const noexcept {
+    Wheels duty;
+    for (int i = 0; i < Robot::kWheels; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      duty(i) = p_.calibration.motor_sign[k] * motors.duty[k];
+    }
+    return duty;
   }
 
   SafetyInputs safety_inputs(const RawSample& raw, const Command& command, const Result& t,
@@ -191,6 +202,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Safety safety_;
   AttitudeFilter attitude_;
   EncoderCheck<Robot::kWheels> encoder_check_;
+  Wheels duty_previous_ = Wheels::Zero();
   Input u_previous_ = Input::Zero();
 };
 

@@ -42,6 +42,10 @@ Vec2 MipWorld::wheel_rates(const State& s) const noexcept {
   return kinematics_.wheels(s(kPhiDot), s(kPsiDot));
 }
 
+// A hand that lifts the robot tips it slowly, our estimate.
+constexpr double kHandRate_rad_s = 0.1;
+constexpr double kHeldTilt_rad = 0.3;
+
 /// Motor and viscous friction, as far as the teeth touch.
 Vec2 MipWorld::gear_torque(const State& s) const noexcept {
   const Vec2 rate = wheel_rates(s);
@@ -127,7 +131,7 @@ void MipWorld::advance(const MotorCommand& command) {
   for (int i = 0; i < steps && !held_; ++i) {
     const double h = world_.common.step_s;
     if (lifted()) {
-      s_(kThetaDot) = 0.0;
+      s_(kThetaDot) = s_(kTheta) < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
       s_(kPsiDot) = 0.0;
     }
     cross_backlash();

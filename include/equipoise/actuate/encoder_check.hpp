@@ -1,14 +1,17 @@
-// Do the encoders show what the motors do? Right after arming each wheel in turn is shaken for 60 ms, forth,
-// back and forth, which moves the robot nowhere; its encoder must follow.
-// In: armed, encoder angles -> out: a drive to add at the wheels; per wheel, stuck or reversed. Verdicts fall
-// before kTicks; afterwards, and disarmed, nothing is added. Motor and encoder are on one shaft: that it
-// follows holds for any robot and any controller. RT-safe.
+// Do the encoders show what the motors do? Right after arming each wheel in turn is shaken for 80 ms; its
+// encoder must follow.
+// In: armed, duties at the wheels since the last tick, encoder angles -> out: a drive to add; per
+// wheel, stuck or reversed. The verdict on the last wheel falls kTicks after arming; from then on, and
+// disarmed, nothing is added. Motor and encoder share a shaft, so this holds for any robot and any
+// controller. Shape, lag and limits were chosen on flights of both robots in the full world: a sound encoder
+// correlates above 0.85 with what is expected, a reversed one below -0.85. RT-safe.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "equipoise/types.hpp"
 
@@ -22,37 +25,42 @@ struct EncoderFaults {
 template <int N>
 class EncoderCheck {
  public:
-  static constexpr int kStroke = 3;           // ticks forth, twice as many back, as many forth
-  static constexpr int kShake = 4 * kStroke;  // 60 ms
-  static constexpr int kWindow = kShake + 4;  // and the answer to its last tick
-  static constexpr int kTicks = N * kWindow;  // after arming: 0.16 s of two wheels, 0.24 s of three
+  static constexpr int kShake = 16;           // ticks: 2 forth, 4 back, 4 forth, 4 back, 2 forth
+  static constexpr int kWindow = kShake + 2;  // and the answer to the last
+  static constexpr int kTicks = N * kWindow;  // 0.18 s of two wheels, 0.27 s of three
 
   /// `drive`: of full duty, more than friction takes, less than throws the robot; 0: no check.
-  explicit EncoderCheck(double drive) : drive_(drive), answer_(expected_answer()) {}
+  explicit EncoderCheck(double drive) : drive_(drive) {}
 
   /// What to add to the wheels' drives in this tick.
   Vec<N> drive() const noexcept {
     Vec<N> drive = Vec<N>::Zero();
-    if (running_) drive(tick_ / kWindow) = drive_ * sense(tick_ % kWindow);
+    if (tick_ >= 0 && tick_ < kTicks) drive(tick_ / kWindow) = drive_ * sense(tick_ % kWindow);
     return drive;
   }
 
-  EncoderFaults update(bool armed, const Vec<N>& angle_rad) noexcept {
+  EncoderFaults update(bool armed, const Vec<N>& duty, const Vec<N>& angle_rad) noexcept {
     if (!armed || !(drive_ > 0.0)) {
-      running_ = false;
       tick_ = -1;
       faults_ = {};
+      speed_.setZero();
+      travel_.setZero();
       return faults_;
     }
-    if (tick_ + 1 > kTicks) return faults_;
-    ++tick_;
-    if (tick_ > 0) {
-      const int wheel = (tick_ - 1) / kWindow;
-      const int sample = (tick_ - 1) % kWindow;
-      angles_[static_cast<std::size_t>(sample)] = angle_rad(wheel);
-      if (sample == kWindow - 1) judge(wheel);
+    if (tick_ >= kTicks) return faults_;
+    // A wheel with inertia under the drive: the answer's shape is what counts, its size is not known.
+    travel_ += speed_ + 0.5 * duty;
+    speed_ = kLag * (speed_ + duty);
+    if (tick_ >= 0) {
+      const auto sample = static_cast<std::size_t>(tick_ % kWindow);
+      for (int wheel = 0; wheel < N; ++wheel) {
+        auto& [angle, expected] = seen_[static_cast<std::size_t>(wheel)];
+        angle[sample] = angle_rad(wheel);
+        expected[sample] = travel_(wheel);
+        if (sample + 1 == angle.size()) judge(wheel, wheel == tick_ / kWindow);
+      }
     }
-    running_ = tick_ < kTicks;
+    ++tick_;
     return faults_;
   }
 
@@ -61,33 +69,23 @@ class EncoderCheck {
 
   static double sense(int tick) noexcept {
     if (tick >= kShake) return 0.0;
-    return tick < kStroke || tick >= 3 * kStroke ? 1.0 : -1.0;
+    return (tick + 2) / 4 % 2 == 0 ? 1.0 : -1.0;
   }
 
-  void judge(int wheel) noexcept {
-    Samples moved = angles_;
-    remove_drift(moved);
-    const auto [low, high] = std::minmax_element(angles_.begin(), angles_.end());
-    const double alike = dot(moved, answer_) / std::sqrt(dot(moved, moved) * dot(answer_, answer_) + 1e-300);
-    if (*high - *low < kStuckTravel_rad) {
+  /// A wheel that is not shaken is judged where its controller, misled by it, has driven it as hard.
+  void judge(int wheel, bool shaken) noexcept {
+    auto& [angle, expected] = seen_[static_cast<std::size_t>(wheel)];
+    const auto [low, high] = std::minmax_element(angle.begin(), angle.end());
+    if (shaken && *high - *low < kStuckTravel_rad) {
       faults_.stuck |= 1U << wheel;
-    } else if (alike < -kAgainst) {
-      faults_.reversed |= 1U << wheel;
-    }
-  }
-
-  /// Angle of a wheel with inertia under the drive, without what a balancing robot does meanwhile.
-  static Samples expected_answer() noexcept {
-    Samples angle{};
-    double speed = 0.0;
-    double travelled = 0.0;
-    for (int i = 0; i < kWindow; ++i) {
-      angle[static_cast<std::size_t>(i)] = travelled;
-      travelled += speed;
-      speed += sense(i);
+      return;
     }
     remove_drift(angle);
-    return angle;
+    remove_drift(expected);
+    const double driven = std::sqrt(dot(expected, expected));
+    if (!shaken && driven < kAsHard * drive_) return;
+    if (dot(angle, expected) < -kAgainst * driven * std::sqrt(dot(angle, angle)))
+      faults_.reversed |= 1U << wheel;
   }
 
   static double dot(const Samples& a, const Samples& b) noexcept {
@@ -96,13 +94,13 @@ class EncoderCheck {
     return sum;
   }
 
-  /// Takes out the least-squares cubic: two steps of Gram-Schmidt per degree.
+  /// Takes out the least-squares cubic, which is what balancing does meanwhile.
   static void remove_drift(Samples& samples) noexcept {
-    std::array<Samples, 4> basis{};
+    std::array<Samples, 4> basis{};  // of polynomials, orthogonal by Gram-Schmidt
     for (std::size_t degree = 0; degree < basis.size(); ++degree) {
       for (std::size_t i = 0; i < samples.size(); ++i) {
         const double t = 2.0 * static_cast<double>(i) / (kWindow - 1) - 1.0;
-        basis[degree][i] = std::pow(t, static_cast<int>(degree));
+        basis[degree][i] = degree == 0 ? 1.0 : t * basis[degree - 1][i];
       }
       for (std::size_t lower = 0; lower < degree; ++lower) subtract(basis[degree], basis[lower]);
       subtract(samples, basis[degree]);
@@ -113,14 +111,16 @@ class EncoderCheck {
     for (std::size_t i = 0; i < samples.size(); ++i) samples[i] -= share * direction[i];
   }
 
-  static constexpr double kStuckTravel_rad = 0.02;
-  static constexpr double kAgainst = 0.5;  // correlation
+  static constexpr double kLag = 0.7;  // of a wheel's speed left after a tick
+  static constexpr double kStuckTravel_rad = 0.01;
+  static constexpr double kAgainst = 0.6;  // correlation
+  static constexpr double kAsHard = 7.0;   // root of the sum of squares, per drive; shaken: 10
 
   double drive_;
-  Samples answer_;
-  Samples angles_{};
-  bool running_ = false;
-  int tick_ = -1;
+  int tick_ = -1;  // of the check, counted from the first armed tick
+  Vec<N> speed_ = Vec<N>::Zero();
+  Vec<N> travel_ = Vec<N>::Zero();
+  std::array<std::pair<Samples, Samples>, static_cast<std::size_t>(N)> seen_{};  // angle, expected
   EncoderFaults faults_;
 };
 

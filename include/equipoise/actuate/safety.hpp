@@ -39,7 +39,7 @@ struct SafetyParams {
   double min_battery_V = 6.0;     // for half a second: two LiPo cells
   double cutoff_battery_V = 5.5;  // for five ticks: the supply is going
   double max_innovation = 5.0;    // normalised innovation, mean over about ten ticks; back below a half: well
-  double max_innovation_s = 0.1;  // above it for longer: longer than a push lasts
+  double max_innovation_s = 0.3;  // above it for longer than a push lasts, or the encoder check
   double encoder_check_drive = 0.3;  // shakes each wheel right after arming; 0: encoders are not checked
   double max_slip_rad_s = 8.0;  // encoders against gyro, where the robot tells; mean over about ten ticks
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
