@@ -6,9 +6,11 @@
 #include <algorithm>
 
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/actuate/encoder_check.hpp"
 #include "equipoise/actuate/safety.hpp"
 #include "equipoise/control/friction.hpp"
 #include "equipoise/robots/contract.hpp"
+#include "equipoise/sense/attitude_filter.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "equipoise/sense/rotor_speed.hpp"
 
@@ -43,6 +45,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     FrictionCompensation friction;
     MotorParameters motor;
     SafetyParams safety;
+    AttitudeFilterParams attitude;
   };
 
   explicit Pipeline(const Params& p)
@@ -52,25 +55,30 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         reference_(p.reference),
         feedback_(p.feedback),
         bridge_(p.motor),
-        safety_(p.safety) {}
+        safety_(p.safety),
+        attitude_(p.attitude) {}
 
   Result tick(const RawSample& raw, const Command& command) noexcept {
     Result t;
     t.z = calibrate<Robot::kWheels>(raw, p_.calibration);  // counts -> SI, body axes
     t.z.wheel_rate_rad_s = rotor_speed_.update(t.z.wheel_angle_rad);
-    const Input axis_rates = kinematics_.axis_rates(t.z.wheel_rate_rad_s);
+    if (p_.attitude.own) apply(attitude_, t.z);  // in place of the packets
 
     t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
     if (!safety_.armed()) reference_.reset(t.x_hat);
-    t.ref = reference_.update(command, t.x_hat);                  // [T] 6.2.1
-    t.u_lin = feedback_.update(t.ref);                            // [T] (6.10)
-    t.u_friction = t.u_lin + p_.friction.compensate(axis_rates);  // [T] 6.2.2
-    const MotorCommand duty = invert_bridges(t);                  // [T] 6.2.3, ch. 4
-    t.motors = safety_.gate(duty, safety_inputs(raw, command, t));
+    t.ref = reference_.update(command, t.x_hat);  // [T] 6.2.1
+    t.u_lin = feedback_.update(t.ref);            // [T] (6.10)
+    const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);
+    t.u_friction = t.u_lin + friction;            // [T] 6.2.2
+    const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
+    const EncoderFaults faults =
+        encoder_check_.update(safety_.armed(), drive_previous_, t.z.wheel_angle_rad, t.z.wheel_rate_rad_s);
+    t.motors = safety_.gate(duty, safety_inputs(raw, command, t, faults));
     t.arm_state = safety_.state();
     t.reasons = safety_.reasons();
 
-    u_previous_ = applied_input(t, axis_rates);
+    u_previous_ = applied_input(t, friction);
+    drive_previous_ = wheel_drive(t);
     return t;
   }
 
@@ -94,17 +102,24 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   /// What the estimators' linear model has felt: the command before compensation, [T] section 6.1, as far as
   /// the supply allowed it; with coasting motors, the input that just cancels the back-EMF.
-  Input applied_input(const Result& t, const Input& axis_rates) const noexcept {
+  Input applied_input(const Result& t, const Input& friction) const noexcept {
     if (!t.motors.enable) {
       return kinematics_.axes_from_wheels(t.z.wheel_rate_rad_s / p_.motor.no_load_rad_s(p_.motor.nominal_V));
     }
     if (!t.saturated) return t.u_lin;
     const double share = bridge_.supply_V(t.z.battery_V, t.z.battery_ok) / p_.motor.nominal_V;
     const Wheels limited = kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-share).cwiseMin(share);
-    return kinematics_.axes_from_wheels(limited) - p_.friction.compensate(axis_rates);
+    return kinematics_.axes_from_wheels(limited) - friction;
   }
 
-  SafetyInputs safety_inputs(const RawSample& raw, const Command& command, const Result& t) const noexcept {
+  /// What drives each wheel, of a linear bridge: a coasting bridge's duty says little about its torque.
+  Wheels wheel_drive(const Result& t) const noexcept {
+    if (!t.motors.enable) return Wheels::Zero();
+    return kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-1.0).cwiseMin(1.0);
+  }
+
+  SafetyInputs safety_inputs(const RawSample& raw, const Command& command, const Result& t,
+                             const EncoderFaults& faults) const noexcept {
     SafetyInputs in;
     in.state = view(t.x_hat, p_.robot);
     in.imu_ok = t.z.imu_ok;
@@ -113,6 +128,9 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.attitude_ok = t.z.attitude_ok;
     in.battery_V = t.z.battery_V;
     in.arm_requested = command.arm;
+    in.saturated = t.saturated;
+    in.encoders_stuck = faults.stuck;
+    in.encoders_reversed = faults.reversed;
     in.all_finite = finite(raw) && command.velocity_W_m_s.allFinite() &&
                     std::isfinite(command.yaw_rate_rad_s) && in.state.theta_rad.allFinite() &&
                     in.state.omega_B_rad_s.allFinite() && in.state.phi_rad.allFinite() &&
@@ -136,6 +154,9 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Feedback feedback_;
   Bridge bridge_;
   Safety safety_;
+  AttitudeFilter attitude_;
+  EncoderCheck<Robot::kWheels> encoder_check_;
+  Wheels drive_previous_ = Wheels::Zero();
   Input u_previous_ = Input::Zero();
 };
 

@@ -29,6 +29,14 @@ std::uint32_t Safety::faults(const SafetyInputs& in) noexcept {
   if (encoders_missed_ > (armed ? p_.max_missed_samples : 0)) reasons |= kEncoderStale;
   if (p_.needs_attitude && attitude_age_ > p_.max_attitude_age_ticks) reasons |= kAttitudeStale;
   if (battery_low_ >= kBatteryTicks) reasons |= kBatteryLow;
+  // Only a driven robot saturates, runs away or shows what its encoders are worth.
+  saturated_ = count(saturated_, !(armed && in.saturated));
+  running_away_ = count(running_away_, !(armed && in.state.phi_dot_rad_s.norm() > p_.pick_up_rate_rad_s));
+  if (saturated_ > p_.max_saturated_ticks) reasons |= kSaturated;
+  if (running_away_ > p_.pick_up_ticks) reasons |= kPickedUp;
+  if (armed && in.encoders_stuck != 0) reasons |= kEncoderStuck;
+  if (armed && in.encoders_reversed != 0) reasons |= kEncoderReversed;
+  if (armed) reasons |= (in.encoders_stuck | in.encoders_reversed) * kWheelOne;
   if (!armed && !(in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s)) reasons |= kGyroMoving;
   return reasons;
 }
@@ -47,9 +55,11 @@ MotorCommand Safety::gate(const MotorCommand& wanted, const SafetyInputs& in) no
         state_ = ArmState::kDisarmed;
       } else if (reasons_ != 0) {
         state_ = ArmState::kFault;
+        fault_reasons_ = reasons_ & ~kNotRequested;
       }
       break;
     case ArmState::kFault:
+      reasons_ |= fault_reasons_;
       if (!in.arm_requested) state_ = ArmState::kDisarmed;
       break;
   }

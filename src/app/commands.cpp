@@ -12,6 +12,7 @@ void add_commands(CLI::App& app, int* status) {
   add_model(app, status);
   add_bridge(app, status);
   add_geometry(app, status);
+  add_attitude(app, status);
   add_motor_bench(app, status);
 }
 

@@ -24,6 +24,7 @@ void add_replay(CLI::App& app, int* status);
 void add_model(CLI::App& app, int* status);
 void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);
+void add_attitude(CLI::App& app, int* status);
 void add_motor_bench(CLI::App& app, int* status);
 
 /// A whole file; InputError names it.

@@ -16,8 +16,14 @@ std::string joined(const std::string& robot, const std::vector<std::string>& nam
 
 }  // namespace
 
-std::string known_estimators() { return joined(MbbrFirmware::kName, MbbrFirmware::estimators()); }
-std::string known_controllers() { return joined(MbbrFirmware::kName, MbbrFirmware::controllers()); }
+std::string known_estimators() {
+  return joined(MbbrFirmware::kName, MbbrFirmware::estimators()) + "; " +
+         joined(MipFirmware::kName, MipFirmware::estimators());
+}
+std::string known_controllers() {
+  return joined(MbbrFirmware::kName, MbbrFirmware::controllers()) + "; " +
+         joined(MipFirmware::kName, MipFirmware::controllers());
+}
 
 std::size_t fidelity_level(const std::string& name) {
   const auto level = std::find(kFidelityNames.begin(), kFidelityNames.end(), name);
@@ -32,6 +38,7 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
       config.estimators.active = static_cast<MbbrEstimatorId>(i);
   }
   config.estimators.compare = choice.compare;
+  if (!choice.attitude.empty()) config.attitude.own = choice.attitude == "own";
   config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
   // In simulation the firmware is configured for the robot it is on: the level's bridge, and no compensation
   // of absent friction.
@@ -39,6 +46,22 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
     if (!config.world[i].friction) config.friction.gain = 0.0;
+  }
+  return config;
+}
+
+MipConfig MipFirmware::apply(const MipConfig& configured, const Choice& choice) {
+  MipConfig config = configured;
+  for (std::size_t i = 0; i < kMipEstimatorNames.size(); ++i) {
+    if (choice.estimator == kMipEstimatorNames[i]) config.estimators.active = static_cast<MipEstimatorId>(i);
+  }
+  config.estimators.compare = choice.compare;
+  if (!choice.attitude.empty()) config.attitude.own = choice.attitude == "own";
+  config.safety.needs_attitude = config.estimators.active == MipEstimatorId::kAttitude;
+  if (!choice.fidelity.empty()) {
+    const std::size_t i = fidelity_level(choice.fidelity);
+    config.motor.bridge = config.world_bridge[i];
+    if (!config.world[i].common.friction) config.friction.gain = 0.0;
   }
   return config;
 }

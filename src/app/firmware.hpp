@@ -23,6 +23,7 @@ struct Choice {
   std::string controller;
   std::string fidelity;  // of the simulated world; empty on hardware
   bool compare = false;
+  std::string attitude{};  // dmp or own; empty: as configured
 };
 
 /// Index of a name of kFidelityNames; ConfigError when it is none.
@@ -73,11 +74,58 @@ struct MbbrFirmware {
   }
 };
 
+struct MipFirmware {
+  using Robot = Mip;
+  using Config = MipConfig;
+  using Loaded = LoadedMip;
+  using World = MipWorld;
+  static constexpr const char* kName = "mip";
+  static constexpr const char* kDefaultEstimator = "ekf";
+  static constexpr const char* kDefaultController = "slc";
+  static constexpr const char* kSpeedRmseKey = "wheel_speed_rmse_rad_s";
+  static constexpr const char* kSpeedLabel = "wheel speed RMSE";
+  static constexpr const char* kSpeedUnit = "rad/s";
+  static constexpr double kSpeedScale = 1.0;
+
+  static Loaded load(const std::string& path, const std::vector<std::string>& overrides) {
+    return load_mip(path, overrides);
+  }
+  static Loaded parse(const std::string& text, const std::string& origin) { return parse_mip(text, origin); }
+  static std::vector<std::string> estimators() {
+    return {kMipEstimatorNames.begin(), kMipEstimatorNames.end()};
+  }
+  static std::vector<std::string> controllers() { return {"slc", "lqr"}; }
+  static double rolling_radius_m(const Config& c) { return c.robot.r; }
+
+  /// The configuration with the choices applied, as it flies.
+  static Config apply(const Config& configured, const Choice& choice);
+
+  /// f(pipeline); the controller decides its type.
+  template <class F>
+  static auto with_pipeline(const Config& config, const std::string& controller, F&& f) {
+    if (controller == "slc") {
+      MipSlcPipeline pipeline(config.slc_pipeline());
+      return f(pipeline);
+    }
+    MipLqrPipeline pipeline(config.lqr_pipeline());
+    return f(pipeline);
+  }
+
+  /// `config` as it flies; `level` of fidelity.
+  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
+    MipWorldParams params = config.world[level];
+    params.common.seed = seed;
+    return World(config.robot, config.motor, config.calibration, params);
+  }
+};
+
 /// f(firmware) for the robot named `type`; ConfigError when there is none. `where`: file, for the message.
 template <class F>
 auto with_robot(const std::string& type, const std::string& where, F&& f) {
   if (type == MbbrFirmware::kName) return f(MbbrFirmware{});
-  throw ConfigError(where + ": robot.type: \"" + type + "\" cannot be flown by this build; allowed: mbbr");
+  if (type == MipFirmware::kName) return f(MipFirmware{});
+  throw ConfigError(where + ": robot.type: \"" + type +
+                    "\" cannot be flown by this build; allowed: mbbr, mip");
 }
 
 /// Of all robots, for help texts: "mbbr: a, b".

@@ -20,7 +20,6 @@ struct Arguments {
   SimOptions options;
   Choice choice;
   double yaw_hz = 0.0;
-  std::string attitude = "dmp";
   std::vector<std::string> set;
   std::string log;
   std::string json;
@@ -40,7 +39,7 @@ nlohmann::json to_json(const Arguments& a, const SimSummary& s, const std::strin
           {"estimator", a.choice.estimator},
           {"controller", a.choice.controller},
           {"fidelity", a.choice.fidelity},
-          {"attitude", a.attitude},
+          {"attitude", a.choice.attitude},
           {"yaw_hz", a.options.yaw_rate_rad_s / (2.0 * kPi)},
           {"drive_mps", a.options.drive_mps},
           {"duration_s", static_cast<double>(s.ticks) * kTickS},
@@ -194,9 +193,10 @@ void add_sim(CLI::App& app, int* status) {
   command->add_option("--fidelity", a->choice.fidelity, "ideal, thesis, full")
       ->capture_default_str()
       ->check(CLI::IsMember(kFidelityNames));
-  command->add_option("--attitude", a->attitude, "attitude source: dmp")
+  a->choice.attitude = "dmp";
+  command->add_option("--attitude", a->choice.attitude, "attitude source: dmp (packets), own (our filter)")
       ->capture_default_str()
-      ->check(CLI::IsMember({"dmp"}));
+      ->check(CLI::IsMember({"dmp", "own"}));
   command->add_option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
   command->add_flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command->add_option("--log", a->log, "LCM event log (default: logs/sim-...)");

@@ -1,17 +1,16 @@
 #include <algorithm>
 
+#include "common_config.hpp"
 #include "equipoise/config.hpp"
-#include "toml_reader.hpp"
 
 namespace equipoise {
 namespace {
 
 using config::Document;
+using config::read_filter;
 using config::Section;
 
 constexpr double kTwoPi = 2.0 * kPi;
-
-const std::vector<std::string> kBridgeNames{"drive_brake", "drive_coast"};
 
 MbbrParameters read_robot(Section s) {
   MbbrParameters p;
@@ -36,56 +35,6 @@ MbbrParameters read_robot(Section s) {
   p.azimuth_deg = s.number("wheel_azimuth_deg", -180.0, 180.0);
   s.finish();
   return p;
-}
-
-MotorParameters read_motor(Section s) {
-  MotorParameters m;
-  m.resistance_ohm = s.number("resistance_ohm", 0.01, 1000.0);
-  m.torque_constant_N_m_A = s.number("torque_constant_N_m_A", 1e-5, 100.0);
-  m.inductance_H = s.number("inductance_H", 1e-7, 1.0);
-  m.pwm_hz = s.number("pwm_hz", 100.0, 100e3);
-  m.nominal_V = s.number("nominal_V", 1.0, 60.0);
-  m.bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
-  s.finish();
-  return m;
-}
-
-Calibration read_calibration(Section s) {
-  Calibration c;
-  c.gyro_rad_s_per_count = kPi / 180.0 / s.number("gyro_counts_per_deg_s", 1.0, 200.0);
-  c.accel_m_s2_per_count = kGravity_m_s2 / s.number("accel_counts_per_g", 500.0, 20000.0);
-  c.battery_V_per_count = s.number("battery_V_per_count", 1e-6, 1.0);
-  c.battery_offset_V = s.number("battery_offset_V", -5.0, 5.0);
-  c.encoder_counts_per_rev = s.number("encoder_counts_per_rev", 1.0, 1e6);
-  const auto sign = [&s](const std::string& key) {
-    std::array<double, kMaxMotors> signs{1, 1, 1, 1};
-    const std::vector<double> values = s.numbers(key, Mbbr::kWheels, -1.0, 1.0);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (std::abs(values[i]) != 1.0) s.fail(key, "allowed: 1 or -1");
-      signs[i] = values[i];
-    }
-    return signs;
-  };
-  c.encoder_sign = sign("encoder_sign");
-  c.motor_sign = sign("motor_sign");
-  const std::vector<double> mount = s.numbers("R_BS", 9, -1.0, 1.0);
-  c.R_BS = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mount.data());
-  if ((c.R_BS * c.R_BS.transpose() - Mat3::Identity()).norm() > 1e-6 || c.R_BS.determinant() < 0.0) {
-    s.fail("R_BS", "is not a rotation matrix (rows, sensor axes to body axes)");
-  }
-  c.gyro_bias_B_rad_s = s.vector<3>("gyro_bias_rad_s", -1.0, 1.0);
-  c.accel_bias_B_m_s2 = s.vector<3>("accel_bias_m_s2", -2.0, 2.0);
-  s.finish();
-  return c;
-}
-
-template <class Filter, int N, int M>
-void read_filter(Section s, Filter& params) {
-  params.Q = s.vector<N>("q", 0.0, 1e6);
-  params.R = s.vector<M>("r", 1e-15, 1e6);
-  params.input_variance = s.vector<3>("input_variance", 0.0, 100.0);
-  params.initial_variance = s.number("initial_variance", 0.0, 1e3);
-  s.finish();
 }
 
 /// Rows over yaw rate, given in Hz, strictly ascending from zero.
@@ -132,75 +81,29 @@ MbbrThesisFeedbackParams read_thesis(Section s) {
   return p;
 }
 
-SafetyParams read_safety(Section s) {
-  SafetyParams p;
-  p.max_tilt_rad = s.number("max_tilt_rad", 0.05, 1.5);
-  p.max_arm_tilt_rad = s.number("max_arm_tilt_rad", 0.01, 1.0);
-  p.max_arm_rate_rad_s = s.number("max_arm_rate_rad_s", 0.01, 100.0);
-  p.max_missed_samples = s.integer("max_missed_samples", 0, 20);
-  p.max_attitude_age_ticks = s.integer("max_attitude_age_ticks", 1, 200);
-  p.min_battery_V = s.number("min_battery_V", 0.0, 60.0);
-  s.finish();
-  return p;
-}
-
-WorldParams read_world(Section s, BridgeType* bridge) {
-  WorldParams w;
-  *bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
-  w.step_s = s.number("step_s", 1e-5, kTickS);
-  const double steps = kTickS / w.step_s;
-  if (std::abs(steps - std::round(steps)) > 1e-9) s.fail("step_s", "must divide the tick of 0.005 s");
-  w.initial_tilt_rad = s.number("initial_tilt_rad", 0.0, 0.3);
-  w.friction = s.boolean("friction");
-  w.process_noise_sigma = s.vector<10>("process_noise_variance", 0.0, 10.0).cwiseSqrt();
-  w.gyro_sigma_rad_s = s.number("gyro_sigma_rad_s", 0.0, 1.0);
-  w.accel_sigma_m_s2 = s.number("accel_sigma_m_s2", 0.0, 20.0);
-  w.gyro_bias_sigma_rad_s = s.number("gyro_bias_sigma_rad_s", 0.0, 1.0);
-  w.accel_bias_sigma_m_s2 = s.number("accel_bias_sigma_m_s2", 0.0, 5.0);
-  w.encoder_sigma_rad = s.number("encoder_sigma_rad", 0.0, 1.0);
-  w.quantise = s.boolean("quantise");
-  w.battery_V = s.number("battery_V", 1.0, 60.0);
-  w.battery_resistance_ohm = s.number("battery_resistance_ohm", 0.0, 5.0);
-  w.attitude_sigma_rad = s.number("attitude_sigma_rad", 0.0, 0.5);
-  w.attitude_time_constant_s = s.number("attitude_time_constant_s", 0.01, 1000.0);
-  w.attitude_heading_drift_rad_sqrt_s = s.number("attitude_heading_drift_rad_sqrt_s", 0.0, 1.0);
-  w.attitude_latency_ticks = s.integer("attitude_latency_ticks", 0, 15);
-  for (Section& row : s.tables("pushes", 0, 100)) {
-    Push push;
-    push.at_s = row.number("at_s", 0.0, 1e6);
-    push.duration_s = row.number("duration_s", 1e-3, 10.0);
-    push.force_W_N = row.vector<2>("force_N", -100.0, 100.0);
-    row.finish();
-    w.pushes.push_back(push);
-  }
-  s.finish();
-  return w;
-}
-
 LoadedMbbr read_mbbr(const Document& document) {
   Section root(document, document.root(), "");
   LoadedMbbr loaded;
   MbbrConfig& c = loaded.config;
 
   Section robot = root.table("robot");
-  if (robot.text("type") != "mbbr")
-    robot.fail("type", "\"" + robot.text("type") + "\" is not this robot; expected mbbr");
+  config::expect_robot(robot, "mbbr");
   c.robot = read_robot(robot);
-  c.motor = read_motor(root.table("motor"));
-  c.calibration = read_calibration(root.table("calibration"));
+  c.motor = config::read_motor(root.table("motor"));
+  c.calibration = config::read_calibration(root.table("calibration"), Mbbr::kWheels);
   Section friction = root.table("friction");
   c.friction.coulomb_u = c.robot.mu_c / c.robot.k1;
   c.friction.gain = friction.number("compensation", 0.0, 1.5);
   friction.finish();
 
   Section estimator = root.table("estimator");
-  read_filter<KalmanFilter<MbbrModel10>::Params, 10, 8>(estimator.table("ekf"), c.estimators.ekf);
-  read_filter<KalmanFilter<MbbrModel13>::Params, 13, 8>(estimator.table("ekf13"), c.estimators.ekf13);
-  read_filter<KalmanFilter<MbbrPublishedModel>::Params, 13, 8>(estimator.table("ekf13_published"),
-                                                               c.estimators.ekf13_published);
+  read_filter<KalmanFilter<MbbrModel10>>(estimator.table("ekf"), c.estimators.ekf);
+  read_filter<KalmanFilter<MbbrModel13>>(estimator.table("ekf13"), c.estimators.ekf13);
+  read_filter<KalmanFilter<MbbrPublishedModel>>(estimator.table("ekf13_published"),
+                                                c.estimators.ekf13_published);
   Section kf = estimator.table("kf_attitude");
   c.estimators.kf_yaw_transport = kf.boolean("yaw_transport");
-  read_filter<KalmanFilter<MbbrLinearModel>::Params, 8, 6>(kf, c.estimators.kf);
+  read_filter<KalmanFilter<MbbrLinearModel>>(kf, c.estimators.kf);
   estimator.finish();
   c.estimators.robot = c.robot;
 
@@ -211,11 +114,15 @@ LoadedMbbr read_mbbr(const Document& document) {
   c.scheduled.yaw_feedforward = scheduled.boolean("yaw_feedforward");
   scheduled.finish();
   controller.finish();
-  c.safety = read_safety(root.table("safety"));
+  c.safety = config::read_safety(root.table("safety"));
+  c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
-    c.world[i] = read_world(world.table(kFidelityNames[i]), &c.world_bridge[i]);
+    Section level = world.table(kFidelityNames[i]);
+    const Vec<10> variance = level.vector<10>("process_noise_variance", 0.0, 10.0);
+    c.world[i] = config::read_world(level, &c.world_bridge[i]);
+    c.world[i].process_noise_sigma = variance.cwiseSqrt();
   }
   world.finish();
   root.finish();
@@ -226,12 +133,6 @@ LoadedMbbr read_mbbr(const Document& document) {
 
 }  // namespace
 
-std::string robot_type(const std::string& path) {
-  const Document document(path, {});
-  Section root(document, document.root(), "");
-  return root.table("robot").text("type");
-}
-
 LoadedMbbr load_mbbr(const std::string& path, const std::vector<std::string>& overrides) {
   return read_mbbr(Document(path, overrides));
 }
@@ -241,11 +142,11 @@ LoadedMbbr parse_mbbr(const std::string& text, const std::string& origin) {
 }
 
 MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {
-  return {robot, calibration, estimators, reference, thesis, friction, motor, safety};
+  return {robot, calibration, estimators, reference, thesis, friction, motor, safety, attitude};
 }
 
 MbbrScheduledPipeline::Params MbbrConfig::scheduled_pipeline() const {
-  return {robot, calibration, estimators, reference, scheduled, friction, motor, safety};
+  return {robot, calibration, estimators, reference, scheduled, friction, motor, safety, attitude};
 }
 
 }  // namespace equipoise

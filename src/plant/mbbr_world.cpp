@@ -1,20 +1,16 @@
 #include "equipoise/plant/mbbr_world.hpp"
 
-#include <algorithm>
+#include "equipoise/plant/coulomb.hpp"
 
 namespace equipoise {
 namespace {
 
-enum Effect : std::uint64_t { kStart = 1, kProcess, kGyro, kAccel, kEncoder, kAttitude };
-
 enum At : int { kTheta = 0, kOmega = 3, kPhiDot = 6, kPhi = 8, kRelative = 10 };
 
-/// Quaternion of Rz Ry Rx.
-std::array<double, 4> quaternion(const Vec3& theta) {
-  const Eigen::Quaterniond q = Eigen::AngleAxisd(theta.z(), Vec3::UnitZ()) *
-                               Eigen::AngleAxisd(theta.y(), Vec3::UnitY()) *
-                               Eigen::AngleAxisd(theta.x(), Vec3::UnitX());
-  return {q.w(), q.x(), q.y(), q.z()};
+Vec<13> start_state(NoiseStream& noise, double sigma) {
+  Vec<13> s = Vec<13>::Zero();
+  s.segment<3>(kTheta) = noise.gaussian_vector<3>(sigma);
+  return s;
 }
 
 }  // namespace
@@ -22,45 +18,22 @@ std::array<double, 4> quaternion(const Vec3& theta) {
 MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
                      const Calibration& calibration, const WorldParams& world)
     : robot_(robot),
-      motor_(motor),
-      calibration_(calibration),
       world_(world),
       kinematics_(robot),
       dynamics_(robot),
       mobility_(dynamics_.relative_mobility()),
-      start_noise_(world.seed, kStart),
-      process_noise_(world.seed, kProcess),
-      gyro_noise_(world.seed, kGyro),
-      accel_noise_(world.seed, kAccel),
-      encoder_noise_(world.seed, kEncoder),
-      attitude_noise_(world.seed, kAttitude),
-      battery_V_(world.battery_V) {
-  s_.segment<3>(kTheta) = start_noise_.gaussian_vector<3>(world.initial_tilt_rad);
-  gyro_bias_ = start_noise_.gaussian_vector<3>(world.gyro_bias_sigma_rad_s);
-  accel_bias_ = start_noise_.gaussian_vector<3>(world.accel_bias_sigma_m_s2);
-  attitude_history_.fill(s_.segment<3>(kTheta));
-}
+      motors_(motor, calibration, world),
+      start_noise_(world.seed, kStartNoise),
+      process_noise_(world.seed, kProcessNoise),
+      s_(start_state(start_noise_, world.initial_tilt_rad)),
+      sensors_(calibration, world, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)) {}
 
 MbbrMotion MbbrWorld::motion(const State& s) noexcept {
   return {s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot)};
 }
 
 Vec3 MbbrWorld::motor_torque_B(const Vec3& relative_rate_B) const noexcept {
-  if (!command_.enable) return Vec3::Zero();  // all switches open: the current decays at once
-  const Vec3 wheel_rate = kinematics_.wheels_from_ball(relative_rate_B);
-  const double stall_torque = motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
-  const double no_load = motor_.no_load_rad_s(battery_V_);
-  Vec3 torque;
-  for (int i = 0; i < Mbbr::kWheels; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const double duty = calibration_.motor_sign[k] * command_.duty[k];
-    const double omega_r = wheel_rate(i) / no_load;
-    const double current = motor_.bridge == BridgeType::kDriveBrake
-                               ? duty - omega_r
-                               : drive_coast_mean_current(motor_.T_r(), omega_r, duty);
-    torque(i) = stall_torque * current;
-  }
-  return kinematics_.axes_from_wheels(torque);
+  return kinematics_.axes_from_wheels(motors_.torque(kinematics_.wheels_from_ball(relative_rate_B)));
 }
 
 MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B,
@@ -72,7 +45,7 @@ MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B,
   const double theta_z = s(kTheta + 2);
   Vec3 push_B = Vec3::Zero();
   if (!push_W.isZero(0.0)) {
-    const Mat3 R_WB = rotation(quaternion(s.segment<3>(kTheta)));
+    const Mat3 R_WB = rotation(quaternion_of(s.segment<3>(kTheta)));
     push_B = R_WB.transpose() * Vec3(push_W.x(), push_W.y(), 0.0);
   }
   const MbbrAccelerations a = dynamics_.accelerations(m, tau, push_B);
@@ -91,34 +64,7 @@ Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Vec2& push_W) const noexc
   if (!world_.friction) return Vec3::Zero();
   const State next = s + world_.step_s * derivative(s, Vec3::Zero(), push_W);
   const Vec3 free = MbbrDynamics::encoder_rate_B(motion(next));
-  Vec3 tau;
-  for (int i = 0; i < 3; ++i) {
-    tau(i) = std::clamp(-free(i) / (world_.step_s * mobility_(i)), -robot_.mu_c, robot_.mu_c);
-  }
-  return tau;
-}
-
-Vec2 MbbrWorld::push_now() const noexcept {
-  Vec2 force = Vec2::Zero();
-  for (const Push& push : world_.pushes) {
-    if (time_s_ >= push.at_s && time_s_ < push.at_s + push.duration_s) force += push.force_W_N;
-  }
-  return force;
-}
-
-void MbbrWorld::update_battery() noexcept {
-  if (world_.battery_resistance_ohm == 0.0) return;
-  // Mean supply current of a bridge is |duty| times the motor current while driven.
-  double supply_A = 0.0;
-  if (command_.enable) {
-    const Vec3 wheel_rate = kinematics_.wheels_from_ball(MbbrDynamics::encoder_rate_B(motion(s_)));
-    for (int i = 0; i < Mbbr::kWheels; ++i) {
-      const double duty = command_.duty[static_cast<std::size_t>(i)];
-      const double omega_r = wheel_rate(i) / motor_.no_load_rad_s(battery_V_);
-      supply_A += std::abs(duty * motor_.stall_current_A(battery_V_) * (duty - omega_r));
-    }
-  }
-  battery_V_ = world_.battery_V - world_.battery_resistance_ohm * supply_A;
+  return coulomb_torque<3>(free, mobility_, world_.step_s, robot_.mu_c);
 }
 
 void MbbrWorld::disturb() {
@@ -137,7 +83,7 @@ void MbbrWorld::disturb() {
 }
 
 void MbbrWorld::advance(const MotorCommand& command) {
-  command_ = command;
+  motors_.command(command);
   if (command.enable) held_ = false;
   const int steps = static_cast<int>(std::lround(kTickS / world_.step_s));
   for (int i = 0; i < steps && !held_; ++i) {
@@ -156,66 +102,29 @@ void MbbrWorld::advance(const MotorCommand& command) {
   } else {
     disturb();
   }
-  update_battery();
-}
-
-void MbbrWorld::sense_attitude() {
-  const double tau = world_.attitude_time_constant_s;
-  const double keep = std::exp(-kTickS / tau);
-  const double kick = world_.attitude_sigma_rad * std::sqrt(1.0 - keep * keep);
-  attitude_error_.head<2>() = keep * attitude_error_.head<2>() + attitude_noise_.gaussian_vector<2>(kick);
-  attitude_error_.z() +=
-      attitude_noise_.gaussian(world_.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS));
-  attitude_head_ = (attitude_head_ + 1) % kAttitudeDelay;
-  attitude_history_[attitude_head_] = s_.segment<3>(kTheta) + attitude_error_;
+  motors_.update_battery(kinematics_.wheels_from_ball(MbbrDynamics::encoder_rate_B(motion(s_))));
 }
 
 RawSample MbbrWorld::sense() {
   const MbbrMotion m = motion(s_);
-  Vec3 specific_force;
+  TrueMotion now;
+  now.time_s = time_s_;
+  now.theta_rad = s_.segment<3>(kTheta);
+  now.omega_B_rad_s = m.omega_B;
   if (held_) {
-    specific_force = rotation(quaternion(s_.segment<3>(kTheta))).transpose() * Vec3(0.0, 0.0, kGravity_m_s2);
+    now.specific_force_B_m_s2 =
+        rotation(quaternion_of(now.theta_rad)).transpose() * Vec3(0.0, 0.0, kGravity_m_s2);
   } else {
     const Vec3 relative = MbbrDynamics::encoder_rate_B(m);
     const Vec2 push = push_now();
     Vec3 tau = motor_torque_B(relative) + coulomb_torque_B(s_, push);
     if (world_.friction) tau -= robot_.mu_v * relative;
-    specific_force = -dynamics_.accelerometer_B(m, dynamics_.accelerations(m, tau));
+    now.specific_force_B_m_s2 = -dynamics_.accelerometer_B(m, dynamics_.accelerations(m, tau));
   }
-  const Vec3 gyro = m.omega_B + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
-  const Vec3 accel = specific_force + accel_bias_ + accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
-  const Vec3 wheels = kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) +
-                      encoder_noise_.gaussian_vector<3>(world_.encoder_sigma_rad);
-  sense_attitude();
-
-  const auto counts = [this](double value, double per_count) {
-    const double n = value / per_count;
-    return world_.quantise ? std::floor(n + 0.5) : n;
-  };
-  constexpr double kImuRange = 32767.0;
-  const auto imu_counts = [&](double value, double per_count) {
-    const double n = counts(value, per_count);
-    return world_.quantise ? std::clamp(n, -kImuRange - 1.0, kImuRange) : n;
-  };
-  const Vec3 gyro_S = calibration_.R_BS.transpose() * (gyro + calibration_.gyro_bias_B_rad_s);
-  const Vec3 accel_S = calibration_.R_BS.transpose() * (accel + calibration_.accel_bias_B_m_s2);
-
-  RawSample raw;
-  raw.t_ns = static_cast<std::int64_t>(std::llround(time_s_ * 1e9));
-  for (int i = 0; i < 3; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    raw.gyro_counts[k] = imu_counts(gyro_S(i), calibration_.gyro_rad_s_per_count);
-    raw.accel_counts[k] = imu_counts(accel_S(i), calibration_.accel_m_s2_per_count);
-    raw.encoder_counts[k] =
-        counts(calibration_.encoder_sign[k] * wheels(i), 2.0 * kPi / calibration_.encoder_counts_per_rev);
-  }
-  raw.battery_counts = counts(battery_V_ - calibration_.battery_offset_V, calibration_.battery_V_per_count);
-  const auto delay = static_cast<std::size_t>(world_.attitude_latency_ticks);
-  const Vec3 attitude = attitude_history_[(attitude_head_ + kAttitudeDelay - delay) % kAttitudeDelay];
-  const Eigen::Quaterniond q(rotation(quaternion(attitude)) * calibration_.R_BS);
-  raw.attitude_wxyz = {q.w(), q.x(), q.y(), q.z()};
-  raw.imu_ok = raw.encoders_ok = raw.battery_ok = raw.attitude_ok = true;
-  return raw;
+  const Vec3 wheels = kinematics_.wheels_from_ball(s_.segment<3>(kRelative));
+  for (int i = 0; i < 3; ++i) now.wheel_angle_rad[static_cast<std::size_t>(i)] = wheels(i);
+  now.battery_V = motors_.battery_V();
+  return sensors_.sense(now);
 }
 
 MbbrEstimate MbbrWorld::truth() const noexcept {

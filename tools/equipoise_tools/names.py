@@ -21,6 +21,14 @@ SAFETY_REASONS = (
     "battery low",
     "attitude stale",
     "gyro moving",
+    "saturated",
+    "picked up",
+    "encoder stuck",
+    "encoder reversed",
+    "wheel one",
+    "wheel two",
+    "wheel three",
+    "wheel four",
 )
 # Bit by bit, enum rio_health.
 SENSOR_HEALTH = (

@@ -23,6 +23,14 @@ enum SafetyReason : std::uint32_t {
   kBatteryLow = 1u << 5,
   kAttitudeStale = 1u << 6,
   kGyroMoving = 1u << 7,
+  kSaturated = 1u << 8,  // for longer than the timeout: the robot is lost, or something holds it
+  kPickedUp = 1u << 9,   // wheels that run away have no ground
+  kEncoderStuck = 1u << 10,
+  kEncoderReversed = 1u << 11,
+  kWheelOne = 1u << 12,  // which, with the two above
+  kWheelTwo = 1u << 13,
+  kWheelThree = 1u << 14,
+  kWheelFour = 1u << 15,
 };
 
 struct SafetyParams {
@@ -32,7 +40,10 @@ struct SafetyParams {
   int max_missed_samples = 2;       // consecutive ticks without a valid IMU or encoder sample
   int max_attitude_age_ticks = 10;  // where the controller needs the attitude source
   bool needs_attitude = false;
-  double min_battery_V = 6.0;  // two LiPo cells; sampled over kBatteryTicks
+  double min_battery_V = 6.0;       // two LiPo cells; sampled over kBatteryTicks
+  int max_saturated_ticks = 100;    // consecutive
+  double pick_up_rate_rad_s = 1e9;  // of phi
+  int pick_up_ticks = 40;           // consecutive, above that rate
 };
 
 struct SafetyInputs {
@@ -44,6 +55,9 @@ struct SafetyInputs {
   double battery_V = 0.0;
   bool all_finite = false;  // of everything the tick computed
   bool arm_requested = false;
+  bool saturated = false;
+  std::uint32_t encoders_stuck = 0;  // bit per wheel
+  std::uint32_t encoders_reversed = 0;
 };
 
 class Safety {
@@ -67,6 +81,9 @@ class Safety {
   int encoders_missed_ = 0;
   int attitude_age_ = 0;
   int battery_low_ = 0;
+  std::uint32_t fault_reasons_ = 0;  // why it faulted: kept until the request is withdrawn
+  int saturated_ = 0;
+  int running_away_ = 0;
 };
 
 }  // namespace equipoise

@@ -4,11 +4,9 @@
 // most mu_c. Simulation only; allocates nothing after construction; same seed, same bytes.
 #pragma once
 
-#include <array>
-
 #include "equipoise/plant/mbbr_dynamics.hpp"
-#include "equipoise/plant/noise.hpp"
-#include "equipoise/plant/world.hpp"
+#include "equipoise/plant/motors.hpp"
+#include "equipoise/plant/sensors.hpp"
 
 namespace equipoise {
 
@@ -26,7 +24,7 @@ class MbbrWorld {
   MbbrEstimate truth() const noexcept;
   double time_s() const noexcept { return time_s_; }
   bool held() const noexcept { return held_; }
-  double battery_V() const noexcept { return battery_V_; }
+  double battery_V() const noexcept { return motors_.battery_V(); }
 
  private:
   /// Attitude, body rates, ball rates, ball angles (inertial), relative ball angle; 3 + 3 + 2 + 2 + 3.
@@ -35,30 +33,20 @@ class MbbrWorld {
   State derivative(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
   Vec3 motor_torque_B(const Vec3& relative_rate_B) const noexcept;
   Vec3 coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept;
-  Vec2 push_now() const noexcept;
+  Vec2 push_now() const noexcept { return push_force_W(world_, time_s_); }
   void disturb();
-  void update_battery() noexcept;
-  void sense_attitude();
 
   MbbrParameters robot_;
-  MotorParameters motor_;
-  Calibration calibration_;
   WorldParams world_;
   MbbrKinematics kinematics_;
   MbbrDynamics dynamics_;
   Vec3 mobility_;
-  NoiseStream start_noise_, process_noise_, gyro_noise_, accel_noise_, encoder_noise_, attitude_noise_;
-
-  State s_ = State::Zero();
+  SimulatedMotors<Mbbr::kWheels> motors_;
+  NoiseStream start_noise_, process_noise_;
+  State s_;
+  SimulatedSensors sensors_;
   double time_s_ = 0.0;
   bool held_ = true;
-  MotorCommand command_;
-  double battery_V_;
-  Vec3 gyro_bias_, accel_bias_;
-  Vec3 attitude_error_ = Vec3::Zero();
-  static constexpr std::size_t kAttitudeDelay = 16;
-  std::array<Vec3, kAttitudeDelay> attitude_history_{};
-  std::size_t attitude_head_ = 0;
 };
 
 }  // namespace equipoise

@@ -5,6 +5,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "equipoise/control/friction.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
@@ -22,9 +23,10 @@ struct RobotContract {
                 "Sample is the Measurement of its wheels");
   static_assert(std::is_constructible_v<Kinematics, const typename Robot::Parameters&>,
                 "Kinematics is built from Parameters");
-  static_assert(
-      std::is_same_v<decltype(std::declval<const Kinematics&>().axis_rates(std::declval<Wheels>())), Input>,
-      "Kinematics::axis_rates maps wheel rates to the input axes");
+  static_assert(std::is_same_v<decltype(std::declval<const Kinematics&>().friction_input(
+                                   std::declval<FrictionCompensation>(), std::declval<Wheels>())),
+                               Input>,
+                "Kinematics::friction_input applies a compensation where the robot's friction acts");
   static_assert(
       std::is_same_v<decltype(std::declval<const Kinematics&>().wheels_from_axes(std::declval<Input>())),
                      Wheels>,

@@ -41,8 +41,11 @@ class MbbrKinematics {
   /// Ball angle (or rate) relative to the body, body axes, from wheel angles (or rates). (5.3)
   Vec3 ball_from_wheels(const Vec3& wheels) const noexcept { return (1.0 / ratio_) * (T_ob_ * wheels); }
   Vec3 wheels_from_ball(const Vec3& ball_B) const noexcept { return ratio_ * (T_ob_.transpose() * ball_B); }
-  /// Rates that Coulomb friction and back-EMF act on, about the input axes.
-  Vec3 axis_rates(const Vec3& wheel_rates) const noexcept { return ball_from_wheels(wheel_rates); }
+  /// Friction acts about the body axes, [T] section 5.3.
+  template <class Compensation>
+  Vec3 friction_input(const Compensation& c, const Vec3& wheel_rates) const noexcept {
+    return c.compensate(ball_from_wheels(wheel_rates));
+  }
   /// Torque on the ball (or input u), body axes, from wheel torques (or duties). (5.4), (5.14)
   Vec3 axes_from_wheels(const Vec3& wheels) const noexcept { return ratio_ * (T_ob_ * wheels); }
   Vec3 wheels_from_axes(const Vec3& axes_B) const noexcept {

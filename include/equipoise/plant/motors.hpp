@@ -1,0 +1,65 @@
+// The simulated motors of any robot behind their bridges, and the battery that feeds them.
+// In: motor command, wheel rates, supply -> out: torque at each wheel; supply current. Motors with open
+// switches carry no current. Simulation only; no allocation.
+#pragma once
+
+#include "equipoise/actuate/bridge.hpp"
+#include "equipoise/plant/world.hpp"
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+template <int N>
+class SimulatedMotors {
+ public:
+  SimulatedMotors(const MotorParameters& motor, const Calibration& calibration, const WorldParams& world)
+      : motor_(motor),
+        calibration_(calibration),
+        open_V_(world.battery_V),
+        resistance_ohm_(world.battery_resistance_ohm),
+        battery_V_(world.battery_V) {}
+
+  void command(const MotorCommand& command) noexcept { command_ = command; }
+  bool enabled() const noexcept { return command_.enable; }
+  double battery_V() const noexcept { return battery_V_; }
+
+  Vec<N> torque(const Vec<N>& wheel_rate_rad_s) const noexcept {
+    Vec<N> torque = Vec<N>::Zero();
+    if (!command_.enable) return torque;  // all switches open: the current decays at once
+    const double stall_torque = motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
+    const double no_load = motor_.no_load_rad_s(battery_V_);
+    for (int i = 0; i < N; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double duty = calibration_.motor_sign[k] * command_.duty[k];
+      const double omega_r = wheel_rate_rad_s(i) / no_load;
+      const double current = motor_.bridge == BridgeType::kDriveBrake
+                                 ? duty - omega_r
+                                 : drive_coast_mean_current(motor_.T_r(), omega_r, duty);
+      torque(i) = stall_torque * current;
+    }
+    return torque;
+  }
+
+  /// Terminal voltage under the mean supply current; a bridge's is |duty| times the motor current while
+  /// driven.
+  void update_battery(const Vec<N>& wheel_rate_rad_s) noexcept {
+    if (resistance_ohm_ == 0.0) return;
+    double supply_A = 0.0;
+    for (int i = 0; i < N && command_.enable; ++i) {
+      const double duty = command_.duty[static_cast<std::size_t>(i)];
+      const double omega_r = wheel_rate_rad_s(i) / motor_.no_load_rad_s(battery_V_);
+      supply_A += std::abs(duty * motor_.stall_current_A(battery_V_) * (duty - omega_r));
+    }
+    battery_V_ = open_V_ - resistance_ohm_ * supply_A;
+  }
+
+ private:
+  MotorParameters motor_;
+  Calibration calibration_;
+  double open_V_;
+  double resistance_ohm_;
+  double battery_V_;
+  MotorCommand command_;
+};
+
+}  // namespace equipoise

@@ -1,0 +1,61 @@
+// The simulated sensors of any robot: IMU, encoders, battery ADC, attitude packets (DMP).
+// In: true motion at one instant -> out: raw counts with noise, bias, range and resolution. Each effect draws
+// from its own stream. Simulation only; allocates nothing after construction; same seed, same bytes.
+#pragma once
+
+#include <array>
+
+#include "equipoise/plant/noise.hpp"
+#include "equipoise/plant/world.hpp"
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+/// Streams of random numbers; the numbers are part of what a seed means.
+enum NoiseEffect : std::uint64_t {
+  kStartNoise = 1,
+  kProcessNoise,
+  kGyroNoise,
+  kAccelNoise,
+  kEncoderNoise,
+  kAttitudeNoise
+};
+
+/// Quaternion (w, x, y, z) of Rz Ry Rx.
+std::array<double, 4> quaternion_of(const Vec3& theta_rad);
+
+struct TrueMotion {
+  double time_s = 0.0;
+  Vec3 theta_rad = Vec3::Zero();  // roll, pitch, continuous yaw
+  Vec3 omega_B_rad_s = Vec3::Zero();
+  Vec3 specific_force_B_m_s2 = Vec3::Zero();         // at the IMU
+  std::array<double, kMaxMotors> wheel_angle_rad{};  // relative to the body
+  double battery_V = 0.0;
+};
+
+class SimulatedSensors {
+ public:
+  /// Draws the constant biases from `start`, which the world has used for its initial state.
+  SimulatedSensors(const Calibration& calibration, const WorldParams& world, int wheels, NoiseStream& start,
+                   const Vec3& theta_rad);
+
+  RawSample sense(const TrueMotion& m);
+
+ private:
+  void attitude_packet(const Vec3& theta_rad);
+
+  Calibration calibration_;
+  WorldParams world_;
+  std::size_t wheels_;
+  NoiseStream gyro_noise_, accel_noise_, encoder_noise_, attitude_noise_;
+  Vec3 gyro_bias_, accel_bias_;
+  Vec3 attitude_error_ = Vec3::Zero();
+  static constexpr std::size_t kAttitudeDelay = 16;
+  std::array<Vec3, kAttitudeDelay> attitude_history_{};
+  std::size_t attitude_head_ = 0;
+};
+
+/// Sum of the pushes that act at `time_s`, N.
+Vec2 push_force_W(const WorldParams& world, double time_s) noexcept;
+
+}  // namespace equipoise

@@ -1,0 +1,121 @@
+#include "common_config.hpp"
+
+namespace equipoise {
+
+std::string robot_type(const std::string& path) {
+  const config::Document document(path, {});
+  config::Section root(document, document.root(), "");
+  return root.table("robot").text("type");
+}
+
+namespace config {
+namespace {
+
+const std::vector<std::string> kBridgeNames{"drive_brake", "drive_coast"};
+
+}  // namespace
+
+void expect_robot(Section& robot, const std::string& type) {
+  const std::string found = robot.text("type");
+  if (found != type) robot.fail("type", "\"" + found + "\" is not this robot; expected " + type);
+}
+
+MotorParameters read_motor(Section s) {
+  MotorParameters m;
+  m.resistance_ohm = s.number("resistance_ohm", 0.01, 1000.0);
+  m.torque_constant_N_m_A = s.number("torque_constant_N_m_A", 1e-5, 100.0);
+  m.inductance_H = s.number("inductance_H", 1e-7, 1.0);
+  m.pwm_hz = s.number("pwm_hz", 100.0, 100e3);
+  m.nominal_V = s.number("nominal_V", 1.0, 60.0);
+  m.bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
+  s.finish();
+  return m;
+}
+
+Calibration read_calibration(Section s, int wheels) {
+  Calibration c;
+  c.gyro_rad_s_per_count = kPi / 180.0 / s.number("gyro_counts_per_deg_s", 1.0, 200.0);
+  c.accel_m_s2_per_count = kGravity_m_s2 / s.number("accel_counts_per_g", 500.0, 20000.0);
+  c.battery_V_per_count = s.number("battery_V_per_count", 1e-6, 1.0);
+  c.battery_offset_V = s.number("battery_offset_V", -5.0, 5.0);
+  c.encoder_counts_per_rev = s.number("encoder_counts_per_rev", 1.0, 1e6);
+  const auto sign = [&s, wheels](const std::string& key) {
+    std::array<double, kMaxMotors> signs{1, 1, 1, 1};
+    const std::vector<double> values = s.numbers(key, static_cast<std::size_t>(wheels), -1.0, 1.0);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (std::abs(values[i]) != 1.0) s.fail(key, "allowed: 1 or -1");
+      signs[i] = values[i];
+    }
+    return signs;
+  };
+  c.encoder_sign = sign("encoder_sign");
+  c.motor_sign = sign("motor_sign");
+  const std::vector<double> mount = s.numbers("R_BS", 9, -1.0, 1.0);
+  c.R_BS = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mount.data());
+  if ((c.R_BS * c.R_BS.transpose() - Mat3::Identity()).norm() > 1e-6 || c.R_BS.determinant() < 0.0) {
+    s.fail("R_BS", "is not a rotation matrix (rows, sensor axes to body axes)");
+  }
+  c.gyro_bias_B_rad_s = s.vector<3>("gyro_bias_rad_s", -1.0, 1.0);
+  c.accel_bias_B_m_s2 = s.vector<3>("accel_bias_m_s2", -2.0, 2.0);
+  s.finish();
+  return c;
+}
+
+SafetyParams read_safety(Section s) {
+  SafetyParams p;
+  p.max_tilt_rad = s.number("max_tilt_rad", 0.05, 1.5);
+  p.max_arm_tilt_rad = s.number("max_arm_tilt_rad", 0.01, 1.0);
+  p.max_arm_rate_rad_s = s.number("max_arm_rate_rad_s", 0.01, 100.0);
+  p.max_missed_samples = s.integer("max_missed_samples", 0, 20);
+  p.max_attitude_age_ticks = s.integer("max_attitude_age_ticks", 1, 200);
+  p.min_battery_V = s.number("min_battery_V", 0.0, 60.0);
+  p.max_saturated_ticks = s.integer("max_saturated_ticks", 1, 10000);
+  p.pick_up_rate_rad_s = s.number("pick_up_rate_rad_s", 0.1, 1e9);
+  p.pick_up_ticks = s.integer("pick_up_ticks", 1, 10000);
+  s.finish();
+  return p;
+}
+
+AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m) {
+  AttitudeFilterParams p;
+  p.own = s.choice("source", {"packets", "own"}) == 1;
+  p.lever_arm_B_m = imu_position_m;
+  p.accel_time_constant_s = s.number("accel_time_constant_s", 0.1, 100.0);
+  s.finish();
+  return p;
+}
+
+WorldParams read_world(Section s, BridgeType* bridge) {
+  WorldParams w;
+  *bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
+  w.step_s = s.number("step_s", 1e-5, kTickS);
+  const double steps = kTickS / w.step_s;
+  if (std::abs(steps - std::round(steps)) > 1e-9) s.fail("step_s", "must divide the tick of 0.005 s");
+  w.initial_tilt_rad = s.number("initial_tilt_rad", 0.0, 0.3);
+  w.friction = s.boolean("friction");
+  w.gyro_sigma_rad_s = s.number("gyro_sigma_rad_s", 0.0, 1.0);
+  w.accel_sigma_m_s2 = s.number("accel_sigma_m_s2", 0.0, 20.0);
+  w.gyro_bias_sigma_rad_s = s.number("gyro_bias_sigma_rad_s", 0.0, 1.0);
+  w.accel_bias_sigma_m_s2 = s.number("accel_bias_sigma_m_s2", 0.0, 5.0);
+  w.encoder_sigma_rad = s.number("encoder_sigma_rad", 0.0, 1.0);
+  w.quantise = s.boolean("quantise");
+  w.battery_V = s.number("battery_V", 1.0, 60.0);
+  w.battery_resistance_ohm = s.number("battery_resistance_ohm", 0.0, 5.0);
+  w.attitude_sigma_rad = s.number("attitude_sigma_rad", 0.0, 0.5);
+  w.attitude_time_constant_s = s.number("attitude_time_constant_s", 0.01, 1000.0);
+  w.attitude_heading_drift_rad_sqrt_s = s.number("attitude_heading_drift_rad_sqrt_s", 0.0, 1.0);
+  w.attitude_latency_ticks = s.integer("attitude_latency_ticks", 0, 15);
+  for (Section& row : s.tables("pushes", 0, 100)) {
+    Push push;
+    push.at_s = row.number("at_s", 0.0, 1e6);
+    push.duration_s = row.number("duration_s", 1e-3, 10.0);
+    push.force_W_N = row.vector<2>("force_N", -100.0, 100.0);
+    row.finish();
+    w.pushes.push_back(push);
+  }
+  s.finish();
+  return w;
+}
+
+}  // namespace config
+}  // namespace equipoise

@@ -1,0 +1,30 @@
+// Sections that every robot's configuration has. In: section of the file -> out: typed parameters;
+// ConfigError otherwise. Start-up only.
+#pragma once
+
+#include "equipoise/estimate/kalman.hpp"
+#include "toml_reader.hpp"
+
+namespace equipoise::config {
+
+/// ConfigError unless the file is for this robot.
+void expect_robot(Section& robot, const std::string& type);
+
+MotorParameters read_motor(Section s);
+Calibration read_calibration(Section s, int wheels);
+SafetyParams read_safety(Section s);
+/// Of our own filter; `imu_position_m`: lever arm.
+AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m);
+/// All of a world but its process noise; `bridge`: what the simulated robot is built with.
+WorldParams read_world(Section s, BridgeType* bridge);
+
+template <class Filter>
+void read_filter(Section s, typename Filter::Params& params) {
+  params.Q = s.vector<Filter::n>("q", 0.0, 1e6);
+  params.R = s.vector<Filter::m>("r", 1e-15, 1e6);
+  params.input_variance = s.vector<Filter::p>("input_variance", 0.0, 100.0);
+  params.initial_variance = s.number("initial_variance", 0.0, 1e3);
+  s.finish();
+}
+
+}  // namespace equipoise::config

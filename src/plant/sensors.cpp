@@ -1,0 +1,87 @@
+#include "equipoise/plant/sensors.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace equipoise {
+
+std::array<double, 4> quaternion_of(const Vec3& theta) {
+  const Eigen::Quaterniond q = Eigen::AngleAxisd(theta.z(), Vec3::UnitZ()) *
+                               Eigen::AngleAxisd(theta.y(), Vec3::UnitY()) *
+                               Eigen::AngleAxisd(theta.x(), Vec3::UnitX());
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+Vec2 push_force_W(const WorldParams& world, double time_s) noexcept {
+  Vec2 force = Vec2::Zero();
+  for (const Push& push : world.pushes) {
+    if (time_s >= push.at_s && time_s < push.at_s + push.duration_s) force += push.force_W_N;
+  }
+  return force;
+}
+
+SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldParams& world, int wheels,
+                                   NoiseStream& start, const Vec3& theta_rad)
+    : calibration_(calibration),
+      world_(world),
+      wheels_(static_cast<std::size_t>(wheels)),
+      gyro_noise_(world.seed, kGyroNoise),
+      accel_noise_(world.seed, kAccelNoise),
+      encoder_noise_(world.seed, kEncoderNoise),
+      attitude_noise_(world.seed, kAttitudeNoise) {
+  gyro_bias_ = start.gaussian_vector<3>(world.gyro_bias_sigma_rad_s);
+  accel_bias_ = start.gaussian_vector<3>(world.accel_bias_sigma_m_s2);
+  attitude_history_.fill(theta_rad);
+}
+
+void SimulatedSensors::attitude_packet(const Vec3& theta_rad) {
+  const double tau = world_.attitude_time_constant_s;
+  const double keep = std::exp(-kTickS / tau);
+  const double kick = world_.attitude_sigma_rad * std::sqrt(1.0 - keep * keep);
+  attitude_error_.head<2>() = keep * attitude_error_.head<2>() + attitude_noise_.gaussian_vector<2>(kick);
+  attitude_error_.z() +=
+      attitude_noise_.gaussian(world_.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS));
+  attitude_head_ = (attitude_head_ + 1) % kAttitudeDelay;
+  attitude_history_[attitude_head_] = theta_rad + attitude_error_;
+}
+
+RawSample SimulatedSensors::sense(const TrueMotion& m) {
+  const Vec3 gyro = m.omega_B_rad_s + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
+  const Vec3 accel =
+      m.specific_force_B_m_s2 + accel_bias_ + accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
+  attitude_packet(m.theta_rad);
+
+  const auto counts = [this](double value, double per_count) {
+    const double n = value / per_count;
+    return world_.quantise ? std::floor(n + 0.5) : n;
+  };
+  constexpr double kImuRange = 32767.0;
+  const auto imu_counts = [&](double value, double per_count) {
+    const double n = counts(value, per_count);
+    return world_.quantise ? std::clamp(n, -kImuRange - 1.0, kImuRange) : n;
+  };
+  const Vec3 gyro_S = calibration_.R_BS.transpose() * (gyro + calibration_.gyro_bias_B_rad_s);
+  const Vec3 accel_S = calibration_.R_BS.transpose() * (accel + calibration_.accel_bias_B_m_s2);
+
+  RawSample raw;
+  raw.t_ns = static_cast<std::int64_t>(std::llround(m.time_s * 1e9));
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    raw.gyro_counts[k] = imu_counts(gyro_S(i), calibration_.gyro_rad_s_per_count);
+    raw.accel_counts[k] = imu_counts(accel_S(i), calibration_.accel_m_s2_per_count);
+  }
+  for (std::size_t k = 0; k < wheels_; ++k) {
+    const double angle = m.wheel_angle_rad[k] + encoder_noise_.gaussian(world_.encoder_sigma_rad);
+    raw.encoder_counts[k] =
+        counts(calibration_.encoder_sign[k] * angle, 2.0 * kPi / calibration_.encoder_counts_per_rev);
+  }
+  raw.battery_counts = counts(m.battery_V - calibration_.battery_offset_V, calibration_.battery_V_per_count);
+  const auto delay = static_cast<std::size_t>(world_.attitude_latency_ticks);
+  const Vec3 attitude = attitude_history_[(attitude_head_ + kAttitudeDelay - delay) % kAttitudeDelay];
+  const Eigen::Quaterniond q(rotation(quaternion_of(attitude)) * calibration_.R_BS);
+  raw.attitude_wxyz = {q.w(), q.x(), q.y(), q.z()};
+  raw.imu_ok = raw.encoders_ok = raw.battery_ok = raw.attitude_ok = true;
+  return raw;
+}
+
+}  // namespace equipoise
