@@ -1,0 +1,89 @@
+// The eduMIP through the real pipeline, hardware boundary and exact world. Given / when / then.
+#include <gtest/gtest.h>
+
+#include "app/simulate.hpp"
+
+namespace equipoise {
+namespace {
+
+constexpr int kSeeds = 20;
+const std::string kMip = std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml";
+
+app::SimSummary run(const std::string& controller, double yaw_rate_rad_s, std::uint64_t seed,
+                    double duration_s, const std::vector<std::string>& set = {}, bool compare = false) {
+  static const std::atomic<bool> never{false};
+  const app::Choice choice{"ekf", controller, "full", compare, "dmp"};
+  const app::SimOptions options{yaw_rate_rad_s, 0.0, duration_s, seed};
+  return app::simulate<app::MipFirmware>(load_mip(kMip, set).config, choice, options, nullptr, never);
+}
+
+using Case = std::tuple<const char*, const char*, double>;  // controller, bridge, yaw rate
+class MipBalance : public testing::TestWithParam<Case> {};
+
+TEST_P(MipBalance, HoldsAMinuteForEverySeed) {
+  const auto& [controller, bridge, yaw_rate] = GetParam();
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const app::SimSummary s =
+        run(controller, yaw_rate, seed, 60.0, {"world.full.bridge=" + std::string(bridge)});
+    EXPECT_FALSE(s.fell) << "seed " << seed << " at " << s.fell_at_s << " s, reasons " << s.reasons;
+    EXPECT_NEAR(2.0 * kPi * s.yaw_rate_mean_hz, yaw_rate, 0.05) << "seed " << seed;
+    EXPECT_LE(s.controlling.attitude_rmse_rad, 0.010) << "seed " << seed;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Cases, MipBalance,
+                         testing::Combine(testing::Values("slc", "lqr"),
+                                          testing::Values("drive_brake", "drive_coast"),
+                                          testing::Values(0.0, 5.0, 10.0)));
+
+TEST(Mip, FiltersWithoutTheLeverArmFailAtTenRadiansPerSecond) {
+  const app::SimSummary s = run("slc", 10.0, 1, 20.0, {}, true);
+  ASSERT_FALSE(s.fell);
+  // [T] Table 3.3
+  for (const char* name : {"complementary", "complementary_kf", "planar_kf"}) {
+    EXPECT_GE(s.estimators.at(name).attitude_rmse_rad, 0.08) << name;
+  }
+  EXPECT_LE(s.estimators.at("ekf").attitude_rmse_rad, 0.010);
+}
+
+TEST(Mip, ThePublishedControllerBalancesToo) {
+  EXPECT_FALSE(
+      run("slc", 0.0, 1, 30.0, {"controller.slc.published=true", "world.full.backlash_rad=0.0"}).fell);
+}
+
+TEST(Mip, RecoversFromAPush) {
+  const std::vector<std::string> push{"world.full.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, 1.0]}]"};
+  for (const char* controller : {"slc", "lqr"}) {
+    const app::SimSummary s = run(controller, 0.0, 1, 10.0, push);
+    EXPECT_FALSE(s.fell) << controller;
+    EXPECT_GT(s.duty_max, run(controller, 0.0, 1, 10.0).duty_max) << "the push was felt";
+  }
+}
+
+TEST(MipConfig, RefusesAnotherRobotsFileAndNamesTheLine) {
+  const std::string mbbr = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
+  try {
+    load_mip(mbbr, {});
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("mbbr.toml"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("expected mip"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(load_mbbr(kMip, {}), ConfigError);
+}
+
+TEST(MipConfig, RefusesUnknownKeysAndMissingGains) {
+  EXPECT_THROW(load_mip(kMip, {"controller.slc.gain=1.0"}), ConfigError);
+  std::string toml = load_mip(kMip, {}).toml;
+  const std::size_t at = toml.find("published");
+  ASSERT_NE(at, std::string::npos);
+  toml.erase(at, toml.find('\n', at) - at);
+  try {
+    parse_mip(toml, "edited");
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("published"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace equipoise
