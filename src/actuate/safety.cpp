@@ -34,9 +34,10 @@ std::uint32_t Safety::faults(const SafetyInputs& in) noexcept {
   running_away_ = count(running_away_, !(armed && in.state.phi_dot_rad_s.norm() > p_.pick_up_rate_rad_s));
   if (saturated_ > p_.max_saturated_ticks) reasons |= kSaturated;
   if (running_away_ > p_.pick_up_ticks) reasons |= kPickedUp;
-  if (armed && in.encoders_stuck != 0) reasons |= kEncoderStuck;
-  if (armed && in.encoders_reversed != 0) reasons |= kEncoderReversed;
-  if (armed) reasons |= (in.encoders_stuck | in.encoders_reversed) * kWheelOne;
+  const bool check = armed && p_.encoder_check;
+  if (check && in.encoders_stuck != 0) reasons |= kEncoderStuck;
+  if (check && in.encoders_reversed != 0) reasons |= kEncoderReversed;
+  if (check) reasons |= (in.encoders_stuck | in.encoders_reversed) * kWheelOne;
   if (!armed && !(in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s)) reasons |= kGyroMoving;
   return reasons;
 }

@@ -69,6 +69,7 @@ SafetyParams read_safety(Section s) {
   p.max_missed_samples = s.integer("max_missed_samples", 0, 20);
   p.max_attitude_age_ticks = s.integer("max_attitude_age_ticks", 1, 200);
   p.min_battery_V = s.number("min_battery_V", 0.0, 60.0);
+  p.encoder_check = s.boolean("encoder_check");
   p.max_saturated_ticks = s.integer("max_saturated_ticks", 1, 10000);
   p.pick_up_rate_rad_s = s.number("pick_up_rate_rad_s", 0.1, 1e9);
   p.pick_up_ticks = s.integer("pick_up_ticks", 1, 10000);

@@ -60,7 +60,7 @@ class EncoderCheck {
   void correlate() noexcept {
     const Vec<N> change = rates_[0] - rates_[5];
     const Vec<N> push =
-        0.5 * duties_[8] + duties_[7] + duties_[6] + duties_[5] + duties_[4] + 0.5 * duties_[3];
+        0.5 * duties_[7] + duties_[6] + duties_[5] + duties_[4] + duties_[3] + 0.5 * duties_[2];
     both_ += change.cwiseProduct(push);
     duty_squared_ += push.cwiseProduct(push);
     change_squared_ += change.cwiseProduct(change);
@@ -70,8 +70,8 @@ class EncoderCheck {
   static constexpr double kBreakaway = 0.15;   // duty that overcomes any healthy gear's friction
   static constexpr double kStuckEffort = 1.0;  // duty beyond it, times ticks
   static constexpr double kStuckTravel_rad = 0.02;
-  static constexpr int kFirstVerdict = 30;
-  static constexpr double kAgainst = 0.5;       // correlation
+  static constexpr int kFirstVerdict = 60;
+  static constexpr double kAgainst = 0.6;       // correlation
   static constexpr double kEnoughDuty = 1.5;    // root of the sum of squares
   static constexpr double kEnoughChange = 5.0;  // rad/s
 

@@ -41,6 +41,7 @@ struct SafetyParams {
   int max_attitude_age_ticks = 10;  // where the controller needs the attitude source
   bool needs_attitude = false;
   double min_battery_V = 6.0;       // two LiPo cells; sampled over kBatteryTicks
+  bool encoder_check = true;        // over the first half second after arming
   int max_saturated_ticks = 100;    // consecutive
   double pick_up_rate_rad_s = 1e9;  // of phi
   int pick_up_ticks = 40;           // consecutive, above that rate
