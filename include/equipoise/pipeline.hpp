@@ -10,6 +10,7 @@
 #include "equipoise/control/friction.hpp"
 #include "equipoise/robots/contract.hpp"
 #include "equipoise/sense/calibrate.hpp"
+#include "equipoise/sense/freshness.hpp"
 #include "equipoise/sense/rotor_speed.hpp"
 
 namespace equipoise {
@@ -25,6 +26,7 @@ struct TickResult {
   bool saturated = false;
   ArmState arm_state = ArmState::kDisarmed;
   std::uint32_t reasons = 0;  // SafetyReason bits
+  std::uint32_t inhibit = 0;  // those of them that the runtime asked for
 };
 
 template <class Robot, class Estimators, class Reference, class Feedback>
@@ -52,11 +54,17 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         reference_(p.reference),
         feedback_(p.feedback),
         bridge_(p.motor),
+        freshness_(freshness_params(p)),
         safety_(p.safety) {}
 
-  Result tick(const RawSample& raw, const Command& command) noexcept {
+  /// `inhibit`: SafetyReason bits of the runtime (guard, overruns, ...) that forbid motors.
+  Result tick(const RawSample& raw, const Command& asked, std::uint32_t inhibit = 0) noexcept {
     Result t;
+    const Fresh fresh = freshness_.update(raw);
+    const Command command = safety_.timely(asked);
     t.z = calibrate<Robot::kWheels>(raw, p_.calibration);  // counts -> SI, body axes
+    t.z.imu_ok = fresh.imu;
+    t.z.attitude_ok = fresh.attitude;
     t.z.wheel_rate_rad_s = rotor_speed_.update(t.z.wheel_angle_rad);
     const Input axis_rates = kinematics_.axis_rates(t.z.wheel_rate_rad_s);
 
@@ -66,9 +74,15 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.u_lin = feedback_.update(t.ref);                            // [T] (6.10)
     t.u_friction = t.u_lin + p_.friction.compensate(axis_rates);  // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);                  // [T] 6.2.3, ch. 4
-    t.motors = safety_.gate(duty, safety_inputs(raw, command, t));
+    SafetyInputs checks = safety_inputs(raw, asked, t);
+    checks.imu_gap = fresh.imu_gap;
+    checks.encoder_jump = fresh.encoder_jump;
+    checks.slip_rad_s = slip_rad_s<Robot>(t, axis_rates, 0);
+    checks.inhibit = inhibit;
+    t.motors = safety_.gate(duty, checks);
     t.arm_state = safety_.state();
     t.reasons = safety_.reasons();
+    t.inhibit = inhibit;
 
     u_previous_ = applied_input(t, axis_rates);
     return t;
@@ -112,12 +126,40 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.battery_ok = t.z.battery_ok;
     in.attitude_ok = t.z.attitude_ok;
     in.battery_V = t.z.battery_V;
+    in.accel_m_s2 = t.z.accel_B_m_s2.norm();
+    for (int i = 0; i < Robot::kWheels; ++i) {
+      in.wheel_rate_rad_s[static_cast<std::size_t>(i)] = t.z.wheel_rate_rad_s(i);
+    }
+    in.saturated = t.saturated;
+    in.command_age_s = command.age_s;
     in.arm_requested = command.arm;
     in.all_finite = finite(raw) && command.velocity_W_m_s.allFinite() &&
-                    std::isfinite(command.yaw_rate_rad_s) && in.state.theta_rad.allFinite() &&
-                    in.state.omega_B_rad_s.allFinite() && in.state.phi_rad.allFinite() &&
-                    in.state.phi_dot_rad_s.allFinite() && t.u_friction.allFinite();
+                    std::isfinite(command.yaw_rate_rad_s) && std::isfinite(command.age_s) &&
+                    in.state.theta_rad.allFinite() && in.state.omega_B_rad_s.allFinite() &&
+                    in.state.phi_rad.allFinite() && in.state.phi_dot_rad_s.allFinite() &&
+                    t.u_friction.allFinite();
     return in;
+  }
+
+  static FreshnessParams freshness_params(const Params& p) noexcept {
+    FreshnessParams f;
+    f.max_identical_samples = p.safety.max_identical_samples;
+    f.max_missed_samples = p.safety.max_missed_samples;
+    // Half as fast again as a wheel without load, and a count of rounding.
+    const double fastest_rad_s = 1.5 * p.motor.no_load_rad_s(p.motor.nominal_V);
+    f.max_counts_per_tick = 1.0 + p.calibration.encoder_counts_per_rev / (2.0 * kPi) * fastest_rad_s * kTickS;
+    return f;
+  }
+
+  /// Encoders against gyro, of robots that can tell.
+  template <class R>
+  static auto slip_rad_s(const Result& t, const Input& axis_rates, int) noexcept
+      -> decltype(R::slip_rad_s(t.z, axis_rates, t.x_hat)) {
+    return R::slip_rad_s(t.z, axis_rates, t.x_hat);
+  }
+  template <class R>
+  static double slip_rad_s(const Result&, const Input&, long) noexcept {
+    return 0.0;
   }
 
   static bool finite(const RawSample& raw) noexcept {
@@ -135,6 +177,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Reference reference_;
   Feedback feedback_;
   Bridge bridge_;
+  Freshness freshness_;
   Safety safety_;
   Input u_previous_ = Input::Zero();
 };

@@ -49,6 +49,7 @@ struct Command {
   double yaw_rate_rad_s = 0.0;
   bool arm = false;
   bool heading_reset = false;
+  double age_s = 0.0;  // since somebody last asked for it
 };
 
 /// What the bridges get.

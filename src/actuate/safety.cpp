@@ -6,57 +6,117 @@
 namespace equipoise {
 namespace {
 
+constexpr int kBatteryTicks = 100;         // half a second below the limit
+constexpr int kCutoffTicks = 5;            // rides through one conversion's spike
+constexpr int kBatteryUnknownTicks = 400;  // two seconds without a valid conversion
+constexpr int kFastTicks = 10;
+constexpr int kFallingTicks = 10;
+constexpr double kFreeFall_m_s2 = 0.2 * kGravity_m_s2;
+constexpr double kStallDuty = 0.9;
+constexpr double kStallRate_rad_s = 0.5;
+constexpr double kMean = 0.1;                  // of the running means: about ten ticks
+constexpr double kLargestInnovation = 1000.0;  // one outlier decides nothing, and is forgotten
+
 int count(int n, bool ok) noexcept { return ok ? 0 : std::min(n + 1, 1 << 20); }
+int ticks(double seconds) noexcept { return static_cast<int>(seconds * kTickHz); }
 
 bool finite_and_bounded(const MotorCommand& command) noexcept {
   return std::all_of(command.duty.begin(), command.duty.end(),
                      [](double d) { return std::isfinite(d) && std::abs(d) <= 1.0; });
 }
 
+bool applies(ArmTransition::If condition, bool value) noexcept {
+  return condition == ArmTransition::If::kAny || (condition == ArmTransition::If::kYes) == value;
+}
+
 }  // namespace
 
-std::uint32_t Safety::faults(const SafetyInputs& in) noexcept {
+std::uint32_t Safety::check_sensors(const SafetyInputs& in) noexcept {
   imu_missed_ = count(imu_missed_, in.imu_ok);
   encoders_missed_ = count(encoders_missed_, in.encoders_ok);
   attitude_age_ = count(attitude_age_, in.attitude_ok);
   battery_low_ = count(battery_low_, !(in.battery_ok && in.battery_V < p_.min_battery_V));
+  battery_gone_ = count(battery_gone_, !(in.battery_ok && in.battery_V < p_.cutoff_battery_V));
+  battery_unknown_ = count(battery_unknown_, in.battery_ok);
 
+  const int missable = armed() ? p_.max_missed_samples : 0;
   std::uint32_t reasons = 0;
-  const double tilt = in.state.theta_rad.head<2>().norm();
-  const bool armed = state_ == ArmState::kArmed;
-  if (!(tilt <= (armed ? p_.max_tilt_rad : p_.max_arm_tilt_rad))) reasons |= kTilt;
-  if (imu_missed_ > (armed ? p_.max_missed_samples : 0)) reasons |= kImuStale;
-  if (encoders_missed_ > (armed ? p_.max_missed_samples : 0)) reasons |= kEncoderStale;
+  if (imu_missed_ > missable || in.imu_gap) reasons |= kImuStale;
+  if (encoders_missed_ > missable) reasons |= kEncoderStale;
+  if (in.encoder_jump) reasons |= kEncoderJump;
   if (p_.needs_attitude && attitude_age_ > p_.max_attitude_age_ticks) reasons |= kAttitudeStale;
-  if (battery_low_ >= kBatteryTicks) reasons |= kBatteryLow;
-  if (!armed && !(in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s)) reasons |= kGyroMoving;
+  if (battery_low_ >= kBatteryTicks || battery_gone_ >= kCutoffTicks ||
+      battery_unknown_ >= kBatteryUnknownTicks) {
+    reasons |= kBatteryLow;
+  }
   return reasons;
 }
 
-MotorCommand Safety::gate(const MotorCommand& wanted, const SafetyInputs& in) noexcept {
-  reasons_ = faults(in);
-  if (!in.all_finite || !finite_and_bounded(wanted)) reasons_ |= kNotFinite;
-  if (!in.arm_requested) reasons_ |= kNotRequested;
+std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
+  const double tilt = in.state.theta_rad.head<2>().norm();
+  const double nis = std::min(std::abs(in.state.normalized_innovation), kLargestInnovation);
+  if (std::isfinite(nis)) innovation_ += kMean * (nis - innovation_);
+  if (std::isfinite(in.slip_rad_s)) slip_ += kMean * (in.slip_rad_s - slip_);
+  unhealthy_ = innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation;
+  falling_ = count(falling_, !(in.imu_ok && in.accel_m_s2 < kFreeFall_m_s2));
+  const double fastest =
+      std::abs(*std::max_element(in.wheel_rate_rad_s.begin(), in.wheel_rate_rad_s.end(),
+                                 [](double a, double b) { return std::abs(a) < std::abs(b); }));
+  fast_ = count(fast_, !(fastest > p_.max_wheel_rate_rad_s));
 
-  switch (state_) {
-    case ArmState::kDisarmed:
-      if (reasons_ == 0) state_ = ArmState::kArmed;
-      break;
-    case ArmState::kArmed:
-      if (reasons_ == kNotRequested) {
-        state_ = ArmState::kDisarmed;
-      } else if (reasons_ != 0) {
-        state_ = ArmState::kFault;
-      }
-      break;
-    case ArmState::kFault:
-      if (!in.arm_requested) state_ = ArmState::kDisarmed;
-      break;
+  std::uint32_t reasons = 0;
+  if (!(tilt <= (armed() ? p_.max_tilt_rad : p_.max_arm_tilt_rad))) reasons |= kTilt;
+  if (!armed() && !(in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s)) reasons |= kGyroMoving;
+  if (unhealthy_) reasons |= kEstimatorUnhealthy;
+  if (std::abs(slip_) > p_.max_slip_rad_s) reasons |= kWheelSlip;
+  if (fast_ >= kFastTicks || falling_ >= kFallingTicks) reasons |= kPickedUp;
+  return reasons;
+}
+
+std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs& in) noexcept {
+  saturated_ = count(saturated_, !(armed() && in.saturated));
+  bool stalled = false;
+  for (std::size_t i = 0; i < stalled_.size(); ++i) {
+    const bool stands = armed() && std::abs(wanted.duty[i]) > kStallDuty &&
+                        std::abs(in.wheel_rate_rad_s[i]) < kStallRate_rad_s;
+    stalled_[i] = count(stalled_[i], !stands);
+    stalled = stalled || stalled_[i] > ticks(p_.max_stall_s);
   }
-  if (state_ != ArmState::kArmed) return {};
+  std::uint32_t reasons = 0;
+  if (stalled) reasons |= kStall;
+  if (saturated_ > ticks(p_.max_saturated_s)) reasons |= kSaturated;
+  return reasons;
+}
+
+void Safety::transition(bool requested, bool well) noexcept {
+  for (const ArmTransition& row : kArmTransitions) {
+    if (row.from == state_ && applies(row.requested, requested) && applies(row.well, well)) {
+      latched_ = row.to == ArmState::kFault ? reasons_ : 0;
+      state_ = row.to;
+      return;
+    }
+  }
+}
+
+MotorCommand Safety::gate(const MotorCommand& wanted, const SafetyInputs& in) noexcept {
+  reasons_ = check_sensors(in) | check_motion(in) | check_drive(wanted, in) | in.inhibit;
+  if (!in.all_finite || !finite_and_bounded(wanted)) reasons_ |= kNotFinite;
+  if (!armed() && !(in.command_age_s <= p_.command_timeout_s)) reasons_ |= kCommandStale;
+  const bool well = reasons_ == 0;
+  if (!in.arm_requested) reasons_ |= kNotRequested;
+  transition(in.arm_requested, well);
+  if (!armed()) return {};
   MotorCommand command = wanted;
   command.enable = true;
   return command;
+}
+
+Command Safety::timely(const Command& command) const noexcept {
+  if (!(command.age_s > p_.command_timeout_s)) return command;
+  Command stop = command;
+  stop.velocity_W_m_s.setZero();
+  stop.yaw_rate_rad_s = 0.0;
+  return stop;
 }
 
 }  // namespace equipoise

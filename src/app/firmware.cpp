@@ -33,6 +33,10 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   }
   config.estimators.compare = choice.compare;
   config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
+  const bool simulated = !choice.fidelity.empty();
+  if (simulated && config.world[fidelity_level(choice.fidelity)].gyro_sigma_rad_s == 0.0) {
+    config.safety.max_identical_samples = 0;  // a noiseless IMU may stand still
+  }
   // In simulation the firmware is configured for the robot it is on: the level's bridge, and no compensation
   // of absent friction.
   if (!choice.fidelity.empty()) {

@@ -132,6 +132,8 @@ void record_tick(std::int64_t tick, std::int64_t now_ns, const RawSample& raw, c
   record->yaw_rate_rad_s = command.yaw_rate_rad_s;
   record->arm = command.arm;
   record->heading_reset = command.heading_reset;
+  record->command_age_s = command.age_s;
+  record->inhibit = t.inhibit;
   record->estimate = runtime::to_record(view(t.x_hat, robot));
   record->reference = runtime::to_record(view(t.ref, robot));
   using Estimators = std::decay_t<decltype(pipeline.estimators())>;

@@ -25,6 +25,7 @@ inline MbbrConfig configured_for(MbbrConfig config, const MbbrRigOptions& option
   config.estimators.active = options.estimator;
   config.estimators.compare = options.compare;
   config.safety.needs_attitude = options.estimator == MbbrEstimatorId::kKfAttitude;
+  if (config.world[level].gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;  // noiseless
   return config;
 }
 

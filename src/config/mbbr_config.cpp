@@ -138,8 +138,16 @@ SafetyParams read_safety(Section s) {
   p.max_arm_tilt_rad = s.number("max_arm_tilt_rad", 0.01, 1.0);
   p.max_arm_rate_rad_s = s.number("max_arm_rate_rad_s", 0.01, 100.0);
   p.max_missed_samples = s.integer("max_missed_samples", 0, 20);
+  p.max_identical_samples = s.integer("max_identical_samples", 0, 1000);
   p.max_attitude_age_ticks = s.integer("max_attitude_age_ticks", 1, 200);
   p.min_battery_V = s.number("min_battery_V", 0.0, 60.0);
+  p.cutoff_battery_V = s.number("cutoff_battery_V", 0.0, 60.0);
+  p.max_innovation = s.number("max_innovation", 1.0, 1000.0);
+  p.max_slip_rad_s = s.number("max_slip_rad_s", 0.1, 1000.0);
+  p.max_wheel_rate_rad_s = s.number("max_wheel_rate_rad_s", 1.0, 10000.0);
+  p.max_saturated_s = s.number("max_saturated_s", 0.01, 60.0);
+  p.max_stall_s = s.number("max_stall_s", 0.01, 60.0);
+  p.command_timeout_s = s.number("command_timeout_s", 0.05, 60.0);
   s.finish();
   return p;
 }

@@ -194,6 +194,7 @@ class Telemetry::Writer {
     m.yaw_rate_rad_s = r.yaw_rate_rad_s;
     m.arm = r.arm ? 1 : 0;
     m.heading_reset = r.heading_reset ? 1 : 0;
+    m.age_s = r.command_age_s;
     emit("EQUIPOISE_COMMAND", m);
   }
 
@@ -219,6 +220,7 @@ class Telemetry::Writer {
     m.reasons = static_cast<std::int32_t>(r.reasons);
     m.sensor_health = static_cast<std::int32_t>(r.raw.health);
     m.battery_V = r.battery_V;
+    m.inhibit = static_cast<std::int32_t>(r.inhibit);
     emit("EQUIPOISE_HEALTH", m);
   }
 

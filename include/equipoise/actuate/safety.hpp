@@ -1,49 +1,68 @@
-// The only place that decides whether motors may run. In: wanted duties, robot-neutral state, sensor flags,
-// command
-// -> out: what the bridges get, and why not. Motors start disarmed; they arm on request while everything is
-// well, and any fault disarms them in the same tick. After a fault the request has to be withdrawn and made
-// again. RT-safe.
+// The only place that decides whether motors may run. In: wanted duties, robot-neutral state, flags of
+// sensors and runtime -> out: what the bridges get, and why not. Motors start disarmed and arm on request
+// while every check passes; any failing check disarms in the same tick and is latched until the request is
+// withdrawn. States and transitions: kArmTransitions; reasons: safety_reasons.hpp. RT-safe.
 #pragma once
 
-#include <cstdint>
-
+#include "equipoise/actuate/safety_reasons.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
 
 enum class ArmState : std::int32_t { kDisarmed = 0, kArmed = 1, kFault = 2 };
+inline constexpr std::array<const char*, 3> kArmStateNames{"disarmed", "armed", "fault"};
 
-/// Why the motors are off, as bits; names are stable (telemetry, CLI, CAN). docs/safety.md
-enum SafetyReason : std::uint32_t {
-  kNotRequested = 1u << 0,
-  kTilt = 1u << 1,
-  kImuStale = 1u << 2,
-  kEncoderStale = 1u << 3,
-  kNotFinite = 1u << 4,
-  kBatteryLow = 1u << 5,
-  kAttitudeStale = 1u << 6,
-  kGyroMoving = 1u << 7,
+/// A row applies when the motors are (not) requested and the checks (do not) pass; the first that applies is
+/// taken, none keeps the state.
+struct ArmTransition {
+  enum class If { kYes, kNo, kAny };
+  ArmState from;
+  If requested;
+  If well;
+  ArmState to;
 };
+inline constexpr std::array<ArmTransition, 4> kArmTransitions{{
+    {ArmState::kDisarmed, ArmTransition::If::kYes, ArmTransition::If::kYes, ArmState::kArmed},
+    {ArmState::kArmed, ArmTransition::If::kAny, ArmTransition::If::kNo, ArmState::kFault},
+    {ArmState::kArmed, ArmTransition::If::kNo, ArmTransition::If::kYes, ArmState::kDisarmed},
+    {ArmState::kFault, ArmTransition::If::kNo, ArmTransition::If::kAny, ArmState::kDisarmed},
+}};
 
 struct SafetyParams {
   double max_tilt_rad = 0.60;       // beyond it the wheels cannot catch the body
   double max_arm_tilt_rad = 0.20;   // and to start
   double max_arm_rate_rad_s = 2.0;  // body rate at which arming is refused
   int max_missed_samples = 2;       // consecutive ticks without a valid IMU or encoder sample
+  int max_identical_samples = 3;    // of the IMU, which is noisy; 0: may stand still (noiseless simulation)
   int max_attitude_age_ticks = 10;  // where the controller needs the attitude source
   bool needs_attitude = false;
-  double min_battery_V = 6.0;  // two LiPo cells; sampled over kBatteryTicks
+  double min_battery_V = 6.0;     // for half a second: two LiPo cells
+  double cutoff_battery_V = 5.5;  // for five ticks: the supply is going
+  double max_innovation = 100.0;   // normalised innovation, mean over about ten ticks; back below a half: well
+  double max_slip_rad_s = 8.0;    // encoders against gyro, where the robot tells; mean over about ten ticks
+  double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
+  double max_saturated_s = 0.5;        // without a break
+  double max_stall_s = 0.3;            // a wheel that stands still at nearly full duty
+  double command_timeout_s = 0.5;      // older: ramp to a stop, do not arm
 };
 
 struct SafetyInputs {
   StateView state;
-  bool imu_ok = false;
+  bool imu_ok = false;   // valid and new
+  bool imu_gap = false;  // more samples were lost than may be
   bool encoders_ok = false;
+  bool encoder_jump = false;  // further than a wheel can turn in a tick
   bool battery_ok = false;
   bool attitude_ok = false;
   double battery_V = 0.0;
+  double accel_m_s2 = 0.0;  // magnitude of gravity minus acceleration
+  double slip_rad_s = 0.0;  // 0 where the robot cannot tell
+  std::array<double, kMaxMotors> wheel_rate_rad_s{};
+  bool saturated = false;
   bool all_finite = false;  // of everything the tick computed
   bool arm_requested = false;
+  double command_age_s = 0.0;
+  std::uint32_t inhibit = 0;  // SafetyReason bits of the runtime: guard, real time, overruns, calibration
 };
 
 class Safety {
@@ -52,21 +71,38 @@ class Safety {
 
   MotorCommand gate(const MotorCommand& wanted, const SafetyInputs& in) noexcept;
 
+  /// A command that nobody renews asks for a stop; the reference ramps.
+  Command timely(const Command& command) const noexcept;
+
   ArmState state() const noexcept { return state_; }
-  std::uint32_t reasons() const noexcept { return reasons_; }
+  /// What stands against arming now and, in a fault, what caused it.
+  std::uint32_t reasons() const noexcept { return reasons_ | latched_; }
   bool armed() const noexcept { return state_ == ArmState::kArmed; }
+  const SafetyParams& params() const noexcept { return p_; }
 
  private:
-  std::uint32_t faults(const SafetyInputs& in) noexcept;
+  std::uint32_t check_sensors(const SafetyInputs& in) noexcept;
+  std::uint32_t check_motion(const SafetyInputs& in) noexcept;
+  std::uint32_t check_drive(const MotorCommand& wanted, const SafetyInputs& in) noexcept;
+  void transition(bool requested, bool well) noexcept;
 
-  static constexpr int kBatteryTicks = 100;  // 0.5 s below the limit
   SafetyParams p_;
   ArmState state_ = ArmState::kDisarmed;
   std::uint32_t reasons_ = kNotRequested;
+  std::uint32_t latched_ = 0;
   int imu_missed_ = 0;
   int encoders_missed_ = 0;
   int attitude_age_ = 0;
   int battery_low_ = 0;
+  int battery_gone_ = 0;
+  int battery_unknown_ = 0;
+  int saturated_ = 0;
+  int fast_ = 0;
+  int falling_ = 0;
+  std::array<int, kMaxMotors> stalled_{};
+  double innovation_ = 0.0;
+  double slip_ = 0.0;
+  bool unhealthy_ = false;
 };
 
 }  // namespace equipoise

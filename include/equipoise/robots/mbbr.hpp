@@ -86,6 +86,13 @@ struct Mbbr {
   using Kinematics = MbbrKinematics;
   using Estimate = MbbrEstimate;
   using Sample = Measurement<kWheels>;
+
+  /// The ball does not spin about the vertical: (R^T omega)_z - Omega_z must be what the encoders say.
+  static double slip_rad_s(const Sample& z, const Vec3& ball_rate_B, const MbbrEstimate& x) noexcept {
+    const double vertical = x.phi_dot_star.x() * std::sin(x.theta_xy.y()) * std::cos(x.theta_xy.x()) -
+                            x.phi_dot_star.y() * std::sin(x.theta_xy.x());
+    return ball_rate_B.z() - (vertical - z.gyro_B_rad_s.z());
+  }
 };
 
 /// Robot-neutral view.

@@ -40,6 +40,8 @@ struct TickRecord {
   double yaw_rate_rad_s;
   bool arm;
   bool heading_reset;
+  double command_age_s;
+  std::uint32_t inhibit;  // SafetyReason bits of the runtime
   // states: the controlling estimate, the reference, the truth, and the estimators side by side
   StateRecord estimate;
   StateRecord reference;

@@ -1,0 +1,51 @@
+// Why the motors are off: one bit per reason, one stable name per bit, for telemetry, CLI, LED and CAN.
+// In: bits -> out: names. RT-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace equipoise {
+
+enum SafetyReason : std::uint32_t {
+  kNotRequested = 1u << 0,
+  kTilt = 1u << 1,
+  kImuStale = 1u << 2,
+  kEncoderStale = 1u << 3,
+  kNotFinite = 1u << 4,
+  kBatteryLow = 1u << 5,
+  kAttitudeStale = 1u << 6,
+  kGyroMoving = 1u << 7,  // arming only
+  kNotCalibrated = 1u << 8,
+  kEncoderSign = 1u << 9,
+  kEstimatorUnhealthy = 1u << 10,
+  kCommandStale = 1u << 11,  // arming only; while armed the robot ramps to a stop
+  kRealtimeMissing = 1u << 12,
+  kGuardDead = 1u << 13,
+  kOverrun = 1u << 14,
+  kPickedUp = 1u << 15,
+  kStall = 1u << 16,
+  kSaturated = 1u << 17,
+  kWheelSlip = 1u << 18,
+  kEncoderJump = 1u << 19,
+  kBridgeFault = 1u << 20,
+  kWriteFailed = 1u << 21,
+  kLogFailed = 1u << 22,
+};
+
+inline constexpr std::array<const char*, 23> kSafetyReasonNames{
+    "not_requested",       "tilt",           "imu_stale",        "encoder_stale",  "not_finite",
+    "battery_low",         "attitude_stale", "gyro_moving",      "not_calibrated", "encoder_sign",
+    "estimator_unhealthy", "command_stale",  "realtime_missing", "guard_dead",     "overrun",
+    "picked_up",           "stall",          "saturated",        "wheel_slip",     "encoder_jump",
+    "bridge_fault",        "write_failed",   "log_failed"};
+
+/// Calls `with(name)` for every bit that is set.
+template <class With>
+void for_each_reason(std::uint32_t reasons, With&& with) {
+  for (std::size_t i = 0; i < kSafetyReasonNames.size(); ++i) {
+    if ((reasons & (1u << i)) != 0) with(kSafetyReasonNames[i]);
+  }
+}
+
+}  // namespace equipoise

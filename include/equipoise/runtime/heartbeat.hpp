@@ -1,0 +1,64 @@
+// The page that loop and guard share: each counts up once per tick, each watches the other's count.
+// In: a POSIX shared-memory name -> out: counters, no locks, no futex. beat() and watch() are RT-safe.
+// The guard has stopped the motors when `cut` is set: the loop must disarm and say so.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+namespace equipoise::runtime {
+
+struct HeartbeatPage {
+  static constexpr std::uint32_t kMagic = 0x45514842;  // "EQHB"
+  std::atomic<std::uint32_t> magic;
+  std::atomic<std::uint32_t> loop;         // counted up by the loop, once per tick
+  std::atomic<std::uint32_t> guard;        // counted up by the guard, once per poll
+  std::atomic<std::uint32_t> cut;          // times the guard has stopped the motors
+  std::atomic<std::uint32_t> want_enable;  // 1: the loop drives, so the guard keeps the bridges awake
+};
+static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "shared between processes");
+
+/// A count that has not moved for too long belongs to somebody who is dead, stopped or hanging.
+class BeatWatch {
+ public:
+  explicit BeatWatch(std::int64_t limit_ns) : limit_ns_(limit_ns) {}
+
+  /// True while the other side lives. Before its first beat nobody is alive.
+  bool alive(std::uint32_t count, std::int64_t now_ns) noexcept {
+    if (count != count_) {
+      count_ = count;
+      changed_ns_ = now_ns;
+      seen_ = true;
+    }
+    return seen_ && now_ns - changed_ns_ <= limit_ns_;
+  }
+  std::int64_t silent_ns(std::int64_t now_ns) const noexcept { return now_ns - changed_ns_; }
+
+ private:
+  std::int64_t limit_ns_;
+  std::uint32_t count_ = 0;
+  std::int64_t changed_ns_ = 0;
+  bool seen_ = false;
+};
+
+/// Maps the page; throws std::runtime_error naming it.
+class SharedHeartbeat {
+ public:
+  enum class Role { kGuard, kLoop };  // the guard creates the page and removes it
+  SharedHeartbeat(const std::string& name, Role role);
+  ~SharedHeartbeat();
+  SharedHeartbeat(const SharedHeartbeat&) = delete;
+  SharedHeartbeat& operator=(const SharedHeartbeat&) = delete;
+
+  HeartbeatPage& page() noexcept { return *page_; }
+
+ private:
+  std::string name_;
+  Role role_;
+  HeartbeatPage* page_ = nullptr;
+};
+
+inline constexpr const char* kDefaultHeartbeat = "/equipoise-heartbeat";
+
+}  // namespace equipoise::runtime
