@@ -11,6 +11,7 @@ void add_commands(CLI::App& app, int* status) {
   add_bridge(app, status);
   add_geometry(app, status);
   add_motor_bench(app, status);
+  add_guard(app, status);
 }
 
 nlohmann::json read_json(const std::string& path) {
