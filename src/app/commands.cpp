@@ -12,6 +12,8 @@ void add_commands(CLI::App& app, int* status) {
   add_geometry(app, status);
   add_motor_bench(app, status);
   add_guard(app, status);
+  add_campaign(app, status);
+  add_bench(app, status);
 }
 
 nlohmann::json read_json(const std::string& path) {

@@ -21,6 +21,8 @@ void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);
 void add_motor_bench(CLI::App& app, int* status);
 void add_guard(CLI::App& app, int* status);
+void add_campaign(CLI::App& app, int* status);
+void add_bench(CLI::App& app, int* status);
 
 /// Reads a JSON file; InputError names it.
 nlohmann::json read_json(const std::string& path);
