@@ -21,6 +21,21 @@ SAFETY_REASONS = (
     "battery low",
     "attitude stale",
     "gyro moving",
+    "not calibrated",
+    "encoder sign",
+    "estimator unhealthy",
+    "command stale",
+    "realtime missing",
+    "guard dead",
+    "overrun",
+    "picked up",
+    "stall",
+    "saturated",
+    "wheel slip",
+    "encoder jump",
+    "bridge fault",
+    "write failed",
+    "log failed",
 )
 # Bit by bit, enum rio_health.
 SENSOR_HEALTH = (
