@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "disturbance_config.hpp"
 #include "equipoise/config.hpp"
 #include "toml_reader.hpp"
 
@@ -173,6 +174,8 @@ WorldParams read_world(Section s, BridgeType* bridge) {
     row.finish();
     w.pushes.push_back(push);
   }
+  w.disturbed = s.has("disturbance");
+  if (w.disturbed) w.disturbance = config::read_disturbance(s.table("disturbance"));
   s.finish();
   return w;
 }

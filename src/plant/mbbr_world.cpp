@@ -28,6 +28,7 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       kinematics_(robot),
       dynamics_(robot),
       mobility_(dynamics_.relative_mobility()),
+      drive_(robot, motor, world.disturbance),
       start_noise_(world.seed, kStart),
       process_noise_(world.seed, kProcess),
       gyro_noise_(world.seed, kGyro),
@@ -39,6 +40,10 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
   gyro_bias_ = start_noise_.gaussian_vector<3>(world.gyro_bias_sigma_rad_s);
   accel_bias_ = start_noise_.gaussian_vector<3>(world.accel_bias_sigma_m_s2);
   attitude_history_.fill(s_.segment<3>(kTheta));
+  const Vec3& tilt = world.disturbance.imu_misalignment_rad;
+  R_imu_ = world.disturbed && !tilt.isZero(0.0)
+               ? Mat3(Eigen::AngleAxisd(tilt.norm(), tilt.normalized()).toRotationMatrix())
+               : Mat3(Mat3::Identity());
 }
 
 MbbrMotion MbbrWorld::motion(const State& s) noexcept {
@@ -51,6 +56,7 @@ MbbrMotion MbbrWorld::motion(const State& s) noexcept {
 
 Vec3 MbbrWorld::motor_torque_B(const Vec3& relative_rate_B) const noexcept {
   if (!command_.enable) return Vec3::Zero();  // all switches open: the current decays at once
+  if (world_.disturbed) return drive_.torque_B(relative_rate_B, signed_duty(), battery_V_);
   const Vec3 wheel_rate = kinematics_.wheels_from_ball(relative_rate_B);
   const double stall_torque = motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
   const double no_load = motor_.no_load_rad_s(battery_V_);
@@ -72,20 +78,20 @@ MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B,
   const MbbrMotion m = motion(s);
   const Vec3 relative = MbbrDynamics::encoder_rate_B(m);
   Vec3 tau = motor_torque_B(relative) + friction_B;
-  if (world_.friction) tau -= robot_.mu_v * relative;
+  if (world_.friction) tau -= viscous_N_m_s() * relative;
   const double theta_z = s(kTheta + 2);
   Vec3 push_B = Vec3::Zero();
   if (!push_W.isZero(0.0)) {
     const Mat3 R_WB = rotation(quaternion(s.segment<3>(kTheta)));
     push_B = R_WB.transpose() * Vec3(push_W.x(), push_W.y(), 0.0);
   }
-  const MbbrAccelerations a = dynamics_.accelerations(m, tau, push_B);
+  const MbbrAccelerations a = dynamics_.accelerations(m, tau, push_B, slope_pull_star(theta_z));
   State d;
   d.segment<3>(kTheta) = euler_rates(m.theta_xy, m.omega_B);
   d.segment<3>(kOmega) = a.omega_dot_B;
   d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, a);
   d.segment<2>(kPhi) = rotate(theta_z, m.phi_dot_star);
-  d.segment<3>(kRelative) = relative;
+  d.segment<3>(kRelative) = world_.disturbed ? drive_.seen_rate_B(relative) : relative;
   return d;
 }
 
@@ -100,9 +106,12 @@ Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Vec2& push_W) const noexc
   next.omega_B += world_.step_s * d.segment<3>(kOmega);
   next.phi_dot_star += world_.step_s * d.segment<2>(kPhiDot);
   const Vec3 free = MbbrDynamics::encoder_rate_B(next);
+  const Vec3 limit =
+      world_.disturbed ? friction_limit_N_m(world_.disturbance, robot_.mu_c, MbbrDynamics::encoder_rate_B(m))
+                       : Vec3(Vec3::Constant(robot_.mu_c));
   Vec3 tau;
   for (int i = 0; i < 3; ++i) {
-    tau(i) = std::clamp(-free(i) / (world_.step_s * mobility_(i)), -robot_.mu_c, robot_.mu_c);
+    tau(i) = std::clamp(-free(i) / (world_.step_s * mobility_(i)), -limit(i), limit(i));
   }
   return tau;
 }
@@ -145,12 +154,39 @@ void MbbrWorld::disturb() {
   s_(kRelative + 2) -= v(2);
 }
 
+Vec3 MbbrWorld::signed_duty() const noexcept {
+  Vec3 duty;
+  for (std::size_t k = 0; k < 3; ++k) {
+    duty(static_cast<int>(k)) = calibration_.motor_sign[k] * command_.duty[k];
+  }
+  return duty;
+}
+
+double MbbrWorld::viscous_N_m_s() const noexcept {
+  return world_.disturbed ? robot_.mu_v + world_.disturbance.extra_viscous_N_m_s : robot_.mu_v;
+}
+
+/// A slope pulls the whole robot downhill at the ball: F = -(m_t + m_b) g slope.
+Vec2 MbbrWorld::slope_pull_star(double theta_z) const noexcept {
+  if (!world_.disturbed || world_.disturbance.floor_slope_rad.isZero(0.0)) return Vec2::Zero();
+  const double weight = (robot_.m_t + robot_.m_b) * kGravity_m_s2;
+  return rotate(-theta_z, Vec2(-weight * world_.disturbance.floor_slope_rad));
+}
+
 void MbbrWorld::advance(const MotorCommand& command) {
-  command_ = command;
+  const int late = world_.disturbed ? world_.disturbance.actuation_latency_steps : 0;
+  if (late == 0) command_ = command;
   if (command.enable) held_ = false;
   const int steps = static_cast<int>(std::lround(kTickS / world_.step_s));
   for (int i = 0; i < steps && !held_; ++i) {
     const double h = world_.step_s;
+    if (i == late) command_ = command;
+    if (world_.disturbed) {
+      const Vec3 relative = MbbrDynamics::encoder_rate_B(motion(s_));
+      const Vec3 wheels = kinematics_.wheels_from_ball(s_.segment<3>(kRelative));
+      drive_.begin_step(
+          {relative, wheels, command_.enable ? signed_duty() : Vec3(Vec3::Zero()), battery_V_, h});
+    }
     const Vec2 push = push_now();
     const Vec3 friction = coulomb_torque_B(s_, push);
     const State k1 = derivative(s_, friction, push);
@@ -180,6 +216,16 @@ void MbbrWorld::sense_attitude() {
 }
 
 RawSample MbbrWorld::sense() {
+  const auto late = static_cast<std::size_t>(world_.disturbed ? world_.disturbance.sensor_latency_ticks : 0);
+  const RawSample now = sense_now();
+  sensed_[sensed_count_ % kSensorDelay] = now;
+  RawSample raw = sensed_[(sensed_count_ - std::min(late, sensed_count_)) % kSensorDelay];
+  ++sensed_count_;
+  raw.t_ns = now.t_ns;
+  return raw;
+}
+
+RawSample MbbrWorld::sense_now() {
   const MbbrMotion m = motion(s_);
   Vec3 specific_force;
   if (held_) {
@@ -188,13 +234,17 @@ RawSample MbbrWorld::sense() {
     const Vec3 relative = MbbrDynamics::encoder_rate_B(m);
     const Vec2 push = push_now();
     Vec3 tau = motor_torque_B(relative) + coulomb_torque_B(s_, push);
-    if (world_.friction) tau -= robot_.mu_v * relative;
-    specific_force = -dynamics_.accelerometer_B(m, dynamics_.accelerations(m, tau));
+    if (world_.friction) tau -= viscous_N_m_s() * relative;
+    const Vec2 pull = slope_pull_star(s_(kTheta + 2));
+    specific_force = -dynamics_.accelerometer_B(m, dynamics_.accelerations(m, tau, Vec3::Zero(), pull));
   }
-  const Vec3 gyro = m.omega_B + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
-  const Vec3 accel = specific_force + accel_bias_ + accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
-  const Vec3 wheels = kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) +
-                      encoder_noise_.gaussian_vector<3>(world_.encoder_sigma_rad);
+  const Vec3 gyro =
+      R_imu_.transpose() * m.omega_B + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
+  const Vec3 accel = R_imu_.transpose() * specific_force + accel_bias_ +
+                     accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
+  Vec3 wheels = kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) +
+                encoder_noise_.gaussian_vector<3>(world_.encoder_sigma_rad);
+  if (world_.disturbed) wheels += drive_.encoder_offset_rad();
   sense_attitude();
 
   const auto counts = [this](double value, double per_count) {

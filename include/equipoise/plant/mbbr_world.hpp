@@ -6,6 +6,7 @@
 
 #include <array>
 
+#include "equipoise/plant/mbbr_drive.hpp"
 #include "equipoise/plant/mbbr_dynamics.hpp"
 #include "equipoise/plant/noise.hpp"
 #include "equipoise/plant/world.hpp"
@@ -34,11 +35,15 @@ class MbbrWorld {
   static MbbrMotion motion(const State& s) noexcept;
   State derivative(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
   Vec3 motor_torque_B(const Vec3& relative_rate_B) const noexcept;
+  Vec2 slope_pull_star(double theta_z) const noexcept;
   Vec3 coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept;
   Vec2 push_now() const noexcept;
   void disturb();
   void update_battery() noexcept;
+  Vec3 signed_duty() const noexcept;
+  double viscous_N_m_s() const noexcept;
   void sense_attitude();
+  RawSample sense_now();
 
   MbbrParameters robot_;
   MotorParameters motor_;
@@ -47,12 +52,17 @@ class MbbrWorld {
   MbbrKinematics kinematics_;
   MbbrDynamics dynamics_;
   Vec3 mobility_;
+  MbbrDrive drive_;  // used when the world is disturbed
+  Mat3 R_imu_;       // misalignment
   NoiseStream start_noise_, process_noise_, gyro_noise_, accel_noise_, encoder_noise_, attitude_noise_;
 
   State s_ = State::Zero();
   double time_s_ = 0.0;
   bool held_ = true;
   MotorCommand command_;
+  static constexpr std::size_t kSensorDelay = 4;
+  std::array<RawSample, kSensorDelay> sensed_{};
+  std::size_t sensed_count_ = 0;
   double battery_V_;
   Vec3 gyro_bias_, accel_bias_;
   Vec3 attitude_error_ = Vec3::Zero();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/plant/mbbr_disturbance.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "equipoise/types.hpp"
 
@@ -48,6 +49,9 @@ struct WorldParams {
   int attitude_latency_ticks = 0;
 
   std::vector<Push> pushes;
+
+  bool disturbed = false;  // of the MBBR: what follows is looked at only then
+  MbbrDisturbanceParams disturbance;
 };
 
 }  // namespace equipoise
