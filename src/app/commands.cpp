@@ -11,6 +11,8 @@ void add_commands(CLI::App& app, int* status) {
   add_bridge(app, status);
   add_geometry(app, status);
   add_motor_bench(app, status);
+  add_identify(app, status);
+  add_friction_rig(app, status);
 }
 
 nlohmann::json read_json(const std::string& path) {

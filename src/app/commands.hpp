@@ -20,6 +20,8 @@ void add_model(CLI::App& app, int* status);
 void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);
 void add_motor_bench(CLI::App& app, int* status);
+void add_identify(CLI::App& app, int* status);
+void add_friction_rig(CLI::App& app, int* status);
 
 /// Reads a JSON file; InputError names it.
 nlohmann::json read_json(const std::string& path);

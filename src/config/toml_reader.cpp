@@ -62,7 +62,7 @@ void apply_override(toml::table& root, const std::string& text) {
     const auto first = source->begin();
     const toml::key& key = first->first;
     const toml::node& value = first->second;
-    if (!target->contains(key)) {
+    if (!target->contains(key) && key != "include") {
       throw ConfigError("--set " + text + ": no such key in the configuration");
     }
     if (value.is_table() && target->get(key)->is_table()) {
@@ -75,6 +75,47 @@ void apply_override(toml::table& root, const std::string& text) {
   }
 }
 
+/// Replaces values of `root` by those of a fragment; a key that the configuration lacks is a mistake.
+void merge(toml::table& root, const toml::table& fragment, const std::string& path,
+           const std::string& where) {
+  for (const auto& [key, value] : fragment) {
+    const std::string name = where.empty() ? std::string(key.str()) : where + "." + std::string(key.str());
+    if (!root.contains(key)) {
+      throw ConfigError(at(path, value.source()) + ": " + name + ": no such key in the configuration");
+    }
+    if (value.is_table() && root.get(key)->is_table()) {
+      merge(*root.get_as<toml::table>(key.str()), *value.as_table(), path, name);
+    } else {
+      value.visit([&](const auto& v) { root.insert_or_assign(key, v); });
+    }
+  }
+}
+
+/// `include = ["fragment.toml"]`: files beside the configuration whose values replace its own, in order.
+void apply_includes(toml::table& root, const std::string& path) {
+  const toml::node* include = root.get("include");
+  if (include == nullptr) return;
+  const toml::array* files = include->as_array();
+  if (files == nullptr) throw ConfigError(path + ": include: expected an array of file names");
+  const std::size_t slash = path.rfind('/');
+  const std::string folder = slash == std::string::npos ? "" : path.substr(0, slash + 1);
+  toml::table merged = root;
+  merged.erase("include");
+  for (const toml::node& node : *files) {
+    if (!node.is_string()) throw ConfigError(path + ": include: expected an array of file names");
+    const std::string name = node.as_string()->get();
+    const std::string fragment = name.rfind('/', 0) == 0 ? name : folder + name;
+    std::ifstream file(fragment);
+    if (!file) throw ConfigError(path + ": include: " + fragment + ": cannot be opened");
+    try {
+      merge(merged, toml::parse(file, fragment), fragment, "");
+    } catch (const toml::parse_error& error) {
+      throw ConfigError(at(fragment, error.source()) + ": " + std::string(error.description()));
+    }
+  }
+  root = std::move(merged);
+}
+
 }  // namespace
 
 Document::Document(const std::string& path, const std::vector<std::string>& overrides) : path_(path) {
@@ -85,7 +126,15 @@ Document::Document(const std::string& path, const std::vector<std::string>& over
   } catch (const toml::parse_error& error) {
     throw ConfigError(at(path, error.source()) + ": " + std::string(error.description()));
   }
-  for (const std::string& text : overrides) apply_override(root_, text);
+  // An include given with --set comes before the other overrides, so that these have the last word.
+  const auto includes = [](const std::string& text) { return text.rfind("include=", 0) == 0; };
+  for (const std::string& text : overrides) {
+    if (includes(text)) apply_override(root_, text);
+  }
+  apply_includes(root_, path);
+  for (const std::string& text : overrides) {
+    if (!includes(text)) apply_override(root_, text);
+  }
 }
 
 Document Document::parse(const std::string& text, const std::string& origin) {

@@ -1,7 +1,7 @@
 """python -m equipoise_tools.calibrate_disturbance [--evaluations N] [--seed N] [--out FILE]
 
 Finds the magnitudes of the simulated disturbances with which the printed EKF, with the noise of [T] (6.28),
-makes the errors of [T] Table 6.1. A random search that narrows around the best set so far; the misfit is how far
+makes the errors of [T] Table 6.1. A random search that narrows around the best set; the misfit is how far
 each of the fourteen errors lies outside +-25 %. The printed EKF's estimates also control, with the scheduled
 gains: its robot stays upright with them, which it does not with (6.29).
 """
