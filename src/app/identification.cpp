@@ -28,19 +28,33 @@ std::string too_short(const BenchLog& log) {
          std::to_string(kMinSamples);
 }
 
-/// Electrical regression, one row per sample: means over it of voltage, current, speed; ends of the current.
+double sample_s(const BenchLog& log) {
+  return (log.rows.back().t_s - log.rows.front().t_s) / static_cast<double>(log.rows.size() - 1);
+}
+
+/// Electrical regression over windows of at least 50 us: means of voltage, current, speed; change of the
+/// current between the window's ends, which are halfway between samples.
 LeastSquares electrical(const BenchLog& log) {
-  const auto n = static_cast<Index>(log.rows.size()) - 2;
+  constexpr double kWindow_s = 50e-6;
+  const auto w = static_cast<std::size_t>(std::max(1.0, std::round(kWindow_s / sample_s(log))));
+  const auto n = static_cast<Index>((log.rows.size() - 2) / w);
   Eigen::MatrixXd A(n, 3);
   Eigen::VectorXd b(n);
   for (Index j = 0; j < n; ++j) {
-    const auto i = static_cast<std::size_t>(j) + 1;
-    const BenchRow& s = log.rows[i];
-    const double dt = s.t_s - log.rows[i - 1].t_s;
-    // The change of current over the sample, from the means of its neighbours.
-    const double di = 0.5 * (log.rows[i + 1].current_A - log.rows[i - 1].current_A);
-    A.row(j) << s.current_A, (s.angle_rad - log.rows[i - 1].angle_rad) / dt, di / dt;
-    b(j) = s.u * s.supply_V;
+    const std::size_t first = 1 + static_cast<std::size_t>(j) * w;
+    const std::size_t last = first + w - 1;
+    double current = 0.0;
+    double voltage = 0.0;
+    for (std::size_t i = first; i <= last; ++i) {
+      current += log.rows[i].current_A;
+      voltage += log.rows[i].u * log.rows[i].supply_V;
+    }
+    const auto count = static_cast<double>(w);
+    const double time = log.rows[last].t_s - log.rows[first - 1].t_s;
+    const double di = 0.5 * (log.rows[last + 1].current_A + log.rows[last].current_A -
+                             log.rows[first].current_A - log.rows[first - 1].current_A);
+    A.row(j) << current / count, (log.rows[last].angle_rad - log.rows[first - 1].angle_rad) / time, di / time;
+    b(j) = voltage / count;
   }
   return least_squares(A, b);
 }
@@ -88,6 +102,10 @@ Identified identify_motor(const BenchLog& log, double inertia_kg_m2) {
   out.estimates = {{"resistance_ohm", R, e.half_width(0)},
                    {"torque_constant_N_m_A", k, e.half_width(1)},
                    {"inductance_H", e.x(2), e.half_width(2)}};
+  // A current that settles within two samples leaves no trace of L.
+  if (e.x(2) < 2.0 * R * sample_s(log)) {
+    out.estimates[2].half_width = std::numeric_limits<double>::infinity();
+  }
   if (!out.estimates[1].determined()) return out;
 
   // Mechanics over windows of 2 x half samples: k i = J omega' + c sign + b omega.
@@ -192,8 +210,17 @@ Identified identify_friction(const BenchLog& log, const FrictionRig& rig) {
     }
     b(row) = rig.k1_N_m * u - rig.k2_ball_N_m_s * ball_rate;
   }
-  const LeastSquares fit = least_squares(A, b);
+  // Torques that nobody measures move the flywheel: its acceleration is what carries the noise, so it is the
+  // one explained, and the parameters come divided by the inertia.
+  Eigen::MatrixXd by_inertia = -A;
+  by_inertia.col(0) = b;
+  LeastSquares fit = least_squares(by_inertia, A.col(0));
   out.r_squared = fit.r_squared;
+  const double inverse = fit.x(0);
+  fit.half_width /= std::abs(inverse);
+  fit.half_width(0) /= std::abs(inverse);
+  fit.x /= inverse;
+  fit.x(0) = 1.0 / inverse;
   out.estimates.push_back({"flywheel_inertia_kg_m2", fit.x(0), fit.half_width(0)});
   out.estimates.push_back({"viscous_friction_N_m_s", fit.x(1), fit.half_width(1)});
   if (directions == 1) {

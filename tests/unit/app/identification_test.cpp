@@ -56,7 +56,11 @@ TEST(IdentifyMotor, ALockedStepDeterminesResistanceAndInductanceAndNotTheTorqueC
         identify_motor(to_log(run_locked_step(p, 200e3, 2000), LoggedBridge::kDriveBrake), 0.0);
     ASSERT_EQ(found.refused, "");
     EXPECT_LT(off(found, "resistance_ohm", p.motor.resistance_ohm), 0.02) << motor;
-    EXPECT_LT(off(found, "inductance_H", p.motor.inductance_H), 0.02) << motor;
+    if (motor == 1) {  // 3 us time constant, 5 us samples
+      EXPECT_FALSE(found.find("inductance_H")->determined());
+    } else {
+      EXPECT_LT(off(found, "inductance_H", p.motor.inductance_H), 0.02) << motor;
+    }
     EXPECT_FALSE(found.find("torque_constant_N_m_A")->determined());
   }
 }

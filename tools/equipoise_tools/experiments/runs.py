@@ -6,8 +6,10 @@ import json
 import os
 import subprocess
 import tempfile
+import tomllib
 from pathlib import Path
 
+from .. import metrics, names
 from ..log import Log, read_log
 from ..paths import UserError, repository_root
 
@@ -46,3 +48,28 @@ def simulate(
         log = Path(folder) / "run.lcm"
         summary = json.loads(equipoise(*arguments, "--log", log, fails=True))
         return summary, read_log(log)
+
+
+def fragment(name: str) -> dict[str, str]:
+    """Values of config/fragments/NAME.toml as settings, key by key."""
+
+    def flat(table: dict, prefix: str = "") -> dict[str, str]:
+        sets: dict[str, str] = {}
+        for key, value in table.items():
+            if isinstance(value, dict):
+                sets |= flat(value, f"{prefix}{key}.")
+            else:
+                sets[prefix + key] = json.dumps(value)
+        return sets
+
+    with (repository_root() / "config" / "fragments" / f"{name}.toml").open("rb") as file:
+        return flat(tomllib.load(file))
+
+
+def over_estimate(log: Log, channel: str) -> float:
+    """Slope of the estimated ball rate on the true one, both axes, after the run has settled."""
+    estimate, truth = metrics.aligned(log, channel, names.TRUTH)
+    settled = (estimate["utime"] - log.start_utime) * 1e-6 >= metrics.SETTLE_S
+    x = metrics.rolling_rates(truth, 2)[settled].ravel()
+    y = metrics.rolling_rates(estimate, 2)[settled].ravel()
+    return float(x @ y / (x @ x))
