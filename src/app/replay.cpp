@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <optional>
@@ -25,13 +26,19 @@ struct Difference {
   double replayed = 0.0;
 };
 
+std::uint64_t bits(double value) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits;
+}
+
 /// Compares bit for bit, but takes any NaN for any other.
 class Comparison {
  public:
   explicit Comparison(std::int64_t tick, Difference* difference) : tick_(tick), difference_(difference) {}
 
   void value(const std::string& field, double logged, double replayed) {
-    if (difference_->found || std::memcmp(&logged, &replayed, sizeof logged) == 0) return;
+    if (difference_->found || bits(logged) == bits(replayed)) return;
     if (std::isnan(logged) && std::isnan(replayed)) return;
     *difference_ = {true, tick_, field, logged, replayed};
   }

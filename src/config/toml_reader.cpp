@@ -244,8 +244,9 @@ void Section::finish() const {
       }
     }
     const std::string hint = nearest.empty() ? "" : "; did you mean " + nearest + "?";
-    throw ConfigError(at(document_.path(), value.source()) + ": " +
-                      (name_.empty() ? name : name_ + "." + name) + ": unknown key" + hint);
+    std::string message = at(document_.path(), value.source()) + ": ";
+    if (!name_.empty()) message += name_ + ".";
+    throw ConfigError(message += name + ": unknown key" + hint);
   }
 }
 

@@ -123,14 +123,18 @@ def test_the_run_command_keeps_stdout_for_json(run_command):
 
 def test_an_interrupted_run_still_leaves_its_report(root, run_command):
     logs = root / "logs"
-    before = set(logs.glob("*/run.lcm"))
+
+    def logged():  # logs/latest is a second name of one of them
+        return {log.resolve() for log in logs.glob("*/run.lcm")}
+
+    before = logged()
     command = [root / "tools/run", "--telemetry", "off", "--realtime", "--duration-s", "600"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
     )
 
     def flying():
-        return [log for log in set(logs.glob("*/run.lcm")) - before if log.stat().st_size > 0]
+        return [log for log in logged() - before if log.stat().st_size > 0]
 
     while process.poll() is None and not flying():
         time.sleep(0.05)
