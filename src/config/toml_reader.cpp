@@ -244,9 +244,12 @@ void Section::finish() const {
       }
     }
     const std::string hint = nearest.empty() ? "" : "; did you mean " + nearest + "?";
-    std::string message = at(document_.path(), value.source()) + ": ";
+    std::string message = at(document_.path(), value.source());
+    message += ": ";
     if (!name_.empty()) message += name_ + ".";
-    throw ConfigError(message += name + ": unknown key" + hint);
+    message += name;
+    message += ": unknown key";
+    throw ConfigError(message + hint);
   }
 }
 
