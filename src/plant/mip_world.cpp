@@ -7,6 +7,10 @@ namespace {
 
 enum At : int { kTheta, kPhi, kPsi, kThetaDot, kPhiDot, kPsiDot, kPosition };
 
+// A hand that lifts the robot tips it slowly, our estimate.
+constexpr double kHandRate_rad_s = 0.1;
+constexpr double kHeldTilt_rad = 0.3;
+
 Vec<8> start_state(NoiseStream& noise, double sigma) {
   Vec<8> s = Vec<8>::Zero();
   s(kTheta) = noise.gaussian(sigma);
@@ -41,10 +45,6 @@ MipMotion MipWorld::motion(const State& s) noexcept {
 Vec2 MipWorld::wheel_rates(const State& s) const noexcept {
   return kinematics_.wheels(s(kPhiDot), s(kPsiDot));
 }
-
-// A hand that lifts the robot tips it slowly, our estimate.
-constexpr double kHandRate_rad_s = 0.1;
-constexpr double kHeldTilt_rad = 0.3;
 
 /// Motor and viscous friction, as far as the teeth touch.
 Vec2 MipWorld::gear_torque(const State& s) const noexcept {
