@@ -9,6 +9,7 @@ void add_attitude(CLI::App& app, int* status) {
   auto json = std::make_shared<std::string>("-");
   auto rate_hz = std::make_shared<double>(kTickHz);
   auto arm = std::make_shared<std::vector<double>>(3, 0.0);
+  auto average_s = std::make_shared<double>(AttitudeFilterParams{}.accel_time_constant_s);
   command
       ->add_option("--in", *in,
                    "rows {gyro_rad_s, accel_m_s2}, body axes, specific force; mag, any unit, optional")
@@ -18,12 +19,17 @@ void add_attitude(CLI::App& app, int* status) {
       ->check(CLI::Range(10.0, 10e3));
   command->add_option("--lever-arm-m", *arm, "from the point that moves least to the IMU: x y z")
       ->expected(3);
+  command
+      ->add_option("--accel-time-constant-s", *average_s, "over which the specific force is averaged")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 100.0));
   command->add_option("--json", *json, "rows {q_wxyz, gyro_bias_rad_s}; output file, - for stdout")
       ->capture_default_str();
   command->callback([=] {
     AttitudeFilterParams params;
     params.tick_s = 1.0 / *rate_hz;
     params.lever_arm_B_m = Eigen::Map<const Vec3>(arm->data());
+    params.accel_time_constant_s = *average_s;
     AttitudeFilter filter(params);
     const auto step = [&](const nlohmann::json& row) -> nlohmann::json {
       filter.update(vector_at<3>(row, "gyro_rad_s"), vector_at<3>(row, "accel_m_s2"));

@@ -52,15 +52,18 @@ AttitudeFilter::AttitudeFilter(const Params& params) noexcept
       force_average_(params.accel_time_constant_s, params.tick_s),
       rotation_average_(params.accel_time_constant_s, params.tick_s),
       turned_bias_average_(params.accel_time_constant_s, params.tick_s),
-      rest_gyro_(0.5, params.tick_s),
-      rest_force_(0.5, params.tick_s),
+      gyro_slow_(0.5, params.tick_s),
+      gyro_fast_(0.05, params.tick_s),
+      force_slow_(0.5, params.tick_s),
+      force_fast_(0.05, params.tick_s),
       P_(Mat3::Identity() * params.bias_sigma_initial_rad_s * params.bias_sigma_initial_rad_s) {}
 
 void AttitudeFilter::detect_rest(const Vec3& gyro, const Vec3& force) noexcept {
-  rest_gyro_mean_ = rest_gyro_.update(gyro);
-  const Vec3 force_mean = rest_force_.update(force);
-  const bool still = (gyro - rest_gyro_mean_).norm() < p_.rest_rate_rad_s &&
-                     (force - force_mean).norm() < p_.rest_accel_m_s2 &&
+  // Two averages, a fast one because a chip's noise may exceed the limits.
+  rest_gyro_mean_ = gyro_slow_.update(gyro);
+  const Vec3 force_mean = force_slow_.update(force);
+  const bool still = (gyro_fast_.update(gyro) - rest_gyro_mean_).norm() < p_.rest_rate_rad_s &&
+                     (force_fast_.update(force) - force_mean).norm() < p_.rest_accel_m_s2 &&
                      rest_gyro_mean_.cwiseAbs().maxCoeff() < p_.bias_limit_rad_s;
   rest_s_ = still ? rest_s_ + p_.tick_s : 0.0;
   at_rest_ = rest_s_ >= p_.rest_after_s;

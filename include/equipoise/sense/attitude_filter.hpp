@@ -15,7 +15,7 @@ struct AttitudeFilterParams {
   bool own = false;                   // use it; false: the attitude packets
   Vec3 lever_arm_B_m = Vec3::Zero();  // from the point that moves least to the IMU
   double tick_s = kTickS;
-  double accel_time_constant_s = 3.0;  // of the average
+  double accel_time_constant_s = 3.5;  // of the average
   double mag_time_constant_s = 9.0;
   double bias_sigma_initial_rad_s = 0.5 * kPi / 180.0;
   double bias_sigma_rest_rad_s = 0.03 * kPi / 180.0;
@@ -24,7 +24,7 @@ struct AttitudeFilterParams {
   double bias_limit_rad_s = 2.0 * kPi / 180.0;
   double rest_rate_rad_s = 2.0 * kPi / 180.0;  // deviation from the average below which it may be at rest
   double rest_accel_m_s2 = 0.5;
-  double rest_after_s = 1.5;
+  double rest_after_s = 0.4;        // a robot stands for half a second before it arms
   double mag_norm_tolerance = 0.1;  // share; beyond it the field is disturbed and not used
   double mag_dip_tolerance_rad = 10.0 * kPi / 180.0;
 };
@@ -70,7 +70,7 @@ class AttitudeFilter {
   VectorLowPass<3> force_average_;
   VectorLowPass<9> rotation_average_;
   VectorLowPass<2> turned_bias_average_;
-  VectorLowPass<3> rest_gyro_, rest_force_;
+  VectorLowPass<3> gyro_slow_, gyro_fast_, force_slow_, force_fast_;  // of rest
   Vec3 rest_gyro_mean_ = Vec3::Zero();
   double rest_s_ = 0.0;
   bool at_rest_ = false;
