@@ -19,8 +19,7 @@ void add_attitude(CLI::App& app, int* status) {
       ->check(CLI::Range(10.0, 10e3));
   command->add_option("--lever-arm-m", *arm, "from the point that moves least to the IMU: x y z")
       ->expected(3);
-  command
-      ->add_option("--accel-time-constant-s", *average_s, "over which the specific force is averaged")
+  command->add_option("--accel-time-constant-s", *average_s, "over which the specific force is averaged")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 100.0));
   command->add_option("--json", *json, "rows {q_wxyz, gyro_bias_rad_s}; output file, - for stdout")

@@ -40,16 +40,15 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   config.estimators.compare = choice.compare;
   if (!choice.attitude.empty()) config.attitude.own = choice.attitude == "own";
   config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
-  const bool simulated = !choice.fidelity.empty();
-  if (simulated && config.world[fidelity_level(choice.fidelity)].gyro_sigma_rad_s == 0.0) {
-    config.safety.max_identical_samples = 0;  // a noiseless IMU may stand still
-  }
+  if (choice.backend == "lockstep")
+    config.safety.max_identical_samples = 0;  // an engine's IMU may stand still
   // In simulation the firmware is configured for the robot it is on: the level's bridge, and no compensation
   // of absent friction.
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
     if (!config.world[i].friction) config.friction.gain = 0.0;
+    if (config.world[i].gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;
   }
   return config;
 }
@@ -62,10 +61,12 @@ MipConfig MipFirmware::apply(const MipConfig& configured, const Choice& choice) 
   config.estimators.compare = choice.compare;
   if (!choice.attitude.empty()) config.attitude.own = choice.attitude == "own";
   config.safety.needs_attitude = config.estimators.active == MipEstimatorId::kAttitude;
+  if (choice.backend == "lockstep") config.safety.max_identical_samples = 0;
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
     if (!config.world[i].common.friction) config.friction.gain = 0.0;
+    if (config.world[i].common.gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;
   }
   return config;
 }

@@ -24,6 +24,7 @@ struct Choice {
   std::string fidelity;  // of the simulated world; empty on hardware
   bool compare = false;
   std::string attitude{};  // dmp or own; empty: as configured
+  std::string backend{};   // of run; empty: sim
 };
 
 /// Index of a name of kFidelityNames; ConfigError when it is none.

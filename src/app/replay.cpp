@@ -222,7 +222,8 @@ std::optional<std::size_t> index_of(const std::string& estimator) {
 
 template <class Firmware>
 int run(const Arguments& a, const FlightLog& log) {
-  Choice choice{log.run.estimator, log.run.controller, log.run.fidelity, false, log.run.attitude};
+  Choice choice{log.run.estimator, log.run.controller, log.run.fidelity, false,
+                log.run.attitude,  log.run.backend};
   complete<Firmware>(choice);
   std::optional<std::size_t> other;
   if (!a.estimator.empty()) {

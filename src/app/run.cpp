@@ -239,6 +239,7 @@ int run_board(const Arguments& a, const Board& board, const std::string& board_t
 }
 
 int run(Arguments a) {
+  a.choice.backend = a.backend;
   if (a.backend == "lockstep" && a.socket.empty()) throw InputError("--backend lockstep needs --socket PATH");
   if (a.backend == "board" && a.board.empty())
     throw InputError("--backend board needs --board FILE, e.g. config/boards/robotics_cape_mbbr.toml");

@@ -17,7 +17,7 @@ namespace equipoise::runtime {
 namespace {
 
 constexpr std::size_t kPage = 4096;
-constexpr std::size_t kStackReserve = 64 * 1024;  // what is in use already, and the guard page
+constexpr std::size_t kStackReserve = std::size_t{64} * 1024;  // what is in use already, and the guard page
 
 /// Touches the pages that the loop's calls will use, so that none is faulted in later.
 [[gnu::noinline]] void touch_stack(std::size_t bytes) {

@@ -73,7 +73,7 @@ def flight(root, binary, folder, robot, yaw, seed):
 
 @pytest.mark.parametrize(("robot", "yaw"), [(r, w) for r, all_w in YAW_RAD_S.items() for w in all_w])
 def test_not_worse_than_vqf_while_balancing(root, binary, tmp_path, robot, yaw):
-    """Over four robots: without yaw the accelerometer's own bias, which no filter sees, decides a single one."""
+    """Over four robots: without yaw the accelerometer's bias, which no filter sees, decides a single one."""
     squares = []
     for seed in range(1, 5):
         gyro, force, true_up = flight(root, binary, tmp_path, robot, yaw, seed)
@@ -103,7 +103,7 @@ def general_motion(seed: int, rate_scale: float, accel_scale: float):
     for step in Rotation.from_rotvec(omega[1:] / RATE_HZ):
         rotations.append(rotations[-1] * step)
     rotation = Rotation.concatenate(rotations)
-    force = rotation.inv().apply(acceleration_W + [0, 0, 9.8])
+    force = rotation.inv().apply(acceleration_W + np.array([0, 0, 9.8]))
     gyro = omega + random.normal(0, 0.005, 3) + random.normal(0, 0.0015, (n, 3))
     return gyro, force + random.normal(0, 0.1, (n, 3)), rotation.inv().apply([0, 0, 1])
 

@@ -221,7 +221,7 @@ def test_a_large_log_goes_on_in_further_files_and_replays_as_one(root, tmp_path)
             connection.recv(512)
     process.wait(timeout=30)
     parts = sorted(tmp_path.glob("run*.lcm"))
-    assert [part.name for part in parts] == ["run.0001.lcm", "run.lcm"]
+    assert [part.name for part in parts] == ["run.0001.lcm", "run.0002.lcm", "run.lcm"]
     assert all(read_log(part)["EQUIPOISE_RUN"][0].robot == "mbbr" for part in parts)
     status, result = replay(root, tmp_path / "run.lcm")
     assert status == 0 and result["ticks"] == 2000 and result["identical"]

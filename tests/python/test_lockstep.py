@@ -245,7 +245,7 @@ def test_a_full_disk_ends_the_flight_with_a_whole_log(root, tmp_path):
     with firmware.connect() as connection:
         robot = Robot(0.01)
         number = 0
-        while not step(connection, robot, number).last:
+        while not fly(connection, robot, 1, first=number).last:
             number += 1
             assert number < 5000
     status, summary, complaint = firmware.end()

@@ -18,7 +18,7 @@ def enumerators(text: str, enum: str) -> list[tuple[str, int]]:
     ("header", "enum", "words"),
     [
         ("include/equipoise/actuate/safety.hpp", "ArmState", names.ARM_STATES),
-        ("include/equipoise/actuate/safety.hpp", "SafetyReason", names.SAFETY_REASONS),
+        ("include/equipoise/actuate/safety_reasons.hpp", "SafetyReason", names.SAFETY_REASONS),
         ("drivers/robot_io.h", "rio_health", names.SENSOR_HEALTH),
     ],
 )

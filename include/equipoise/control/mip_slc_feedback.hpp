@@ -4,6 +4,8 @@
 // Limits are inside the filters, so that saturation does not wind up D1's integrator. RT-safe.
 #pragma once
 
+#include <cmath>
+
 #include <algorithm>
 
 #include "equipoise/control/mip_reference.hpp"
@@ -43,7 +45,7 @@ class MipSlcFeedback {
   explicit MipSlcFeedback(const Params& params)
       : p_(params),
         design_(params.published ? generated::mip::kSlcPublished : generated::mip::kSlc),
-        every_(static_cast<int>(kTickHz / design_.rate_hz + 0.5)),
+        every_(static_cast<int>(std::lround(kTickHz / design_.rate_hz))),
         D1_(design_.D1),
         D2_(design_.D2) {}
 

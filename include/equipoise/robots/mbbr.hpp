@@ -91,7 +91,8 @@ struct Mbbr {
   using Sample = Measurement<kWheels>;
 
   /// The ball does not spin about the vertical: (R^T omega)_z - Omega_z must be what the encoders say.
-  static double slip_rad_s(const Sample& z, const MbbrKinematics& kinematics, const MbbrEstimate& x) noexcept {
+  static double slip_rad_s(const Sample& z, const MbbrKinematics& kinematics,
+                           const MbbrEstimate& x) noexcept {
     const double vertical = x.phi_dot_star.x() * std::sin(x.theta_xy.y()) * std::cos(x.theta_xy.x()) -
                             x.phi_dot_star.y() * std::sin(x.theta_xy.x());
     return kinematics.ball_from_wheels(z.wheel_rate_rad_s).z() - (vertical - z.gyro_B_rad_s.z());

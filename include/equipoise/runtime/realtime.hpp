@@ -16,7 +16,7 @@ struct RealtimeWish {
   int cpu = -1;       // -1: wherever the kernel likes
   bool lock_memory = true;
   bool shallow_idle = true;  // hold /dev/cpu_dma_latency at 0: no slow wake-ups
-  std::size_t stack_bytes = 256 * 1024;
+  std::size_t stack_bytes = std::size_t{256} * 1024;
   std::string cpu_latency_device = "/dev/cpu_dma_latency";
 };
 

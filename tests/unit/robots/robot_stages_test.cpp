@@ -29,7 +29,9 @@ TYPED_TEST(RobotStages, WheelsAndAxesAreEachOthersInverse) {
 
 TYPED_TEST(RobotStages, FrictionIsCompensatedAlongTheMotionAndNotAtRest) {
   const FrictionCompensation c{0.3, 1.0};
-  EXPECT_EQ(this->kinematics.friction_input(c, typename TestFixture::Wheels(TestFixture::Wheels::Zero())).norm(), 0.0);
+  EXPECT_EQ(
+      this->kinematics.friction_input(c, typename TestFixture::Wheels(TestFixture::Wheels::Zero())).norm(),
+      0.0);
   for (int i = 0; i < TypeParam::kWheels; ++i) {
     const typename TestFixture::Wheels rates = 10.0 * TestFixture::Wheels::Unit(i);
     const auto wheel_u = this->kinematics.wheels_from_axes(this->kinematics.friction_input(c, rates));

@@ -41,7 +41,7 @@ def motion_capture(log, random) -> tuple[np.ndarray, np.ndarray]:
 
 
 def measure(yaw_rate: float, seed: int = 1):
-    """(summary, mocap seconds, mocap lean, {estimator: lean at those seconds}); controlled as in [T], by the DMP."""
+    """(summary, mocap seconds, mocap lean, {estimator: lean then}); controlled as in [T], by the DMP."""
     summary, log = simulate(
         "config/edumip.toml",
         yaw_rad_s=yaw_rate,
@@ -63,10 +63,10 @@ def run(out_dir: Path) -> Result:
     result = Result(
         title="MIP attitude at high yaw rates (chapter 3)",
         command="./tools/experiments table_3_3",
-        method=f"{DURATION_S:.0f} s of the eduMIP in the full world at 0, 5 and 10 rad/s; all estimators on the "
-        f"same samples, against the plant's truth at {MOCAP_HZ:.0f} Hz with {1e3 * MOCAP_SIGMA_RAD:.0f} mrad of "
-        "noise. The attitude packets control, as in [T].",
-        differs="our plant's disturbances are modelled, and our EKF knows where the IMU is and weighs friction.",
+        method=f"{DURATION_S:.0f} s of the eduMIP in the full world at 0, 5 and 10 rad/s; all estimators on "
+        f"the same samples, against the plant's truth at {MOCAP_HZ:.0f} Hz with "
+        f"{1e3 * MOCAP_SIGMA_RAD:.0f} mrad of noise. The attitude packets control, as in [T].",
+        differs="our plant's disturbances are modelled; our EKF knows where the IMU is and weighs friction.",
     )
     rmse = {name: [] for name in PRINTED}
     runs = []
