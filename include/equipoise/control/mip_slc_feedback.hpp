@@ -4,9 +4,8 @@
 // Limits are inside the filters, so that saturation does not wind up D1's integrator. RT-safe.
 #pragma once
 
-#include <cmath>
-
 #include <algorithm>
+#include <cmath>
 
 #include "equipoise/control/mip_reference.hpp"
 #include "generated/mip_gains.hpp"
