@@ -218,7 +218,8 @@ def test_a_large_log_goes_on_in_further_files_and_replays_as_one(root, tmp_path)
             message = robot.sensors(step)
             message.last = step == 1999
             connection.send(message.encode())
-            connection.recv(512)
+            motors = equipoise.lockstep_motors_t.decode(connection.recv(512))
+            robot.advance(np.array(motors.duty[:3]), motors.enable)
     process.wait(timeout=30)
     parts = sorted(tmp_path.glob("run*.lcm"))
     assert [part.name for part in parts] == ["run.0001.lcm", "run.0002.lcm", "run.lcm"]
