@@ -152,6 +152,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.saturated = t.saturated;
     in.command_age_s = command.age_s;
     in.arm_requested = command.arm;
+    in.encoders_in_check = encoder_check_.running();
     in.encoders_stuck = faults.stuck;
     in.encoders_reversed = faults.reversed;
     in.all_finite = finite(raw) && command.velocity_W_m_s.allFinite() &&

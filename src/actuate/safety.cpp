@@ -62,7 +62,9 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   const double nis = std::min(std::abs(in.state.normalized_innovation), kLargestInnovation);
   if (std::isfinite(nis)) innovation_ += kMean * (nis - innovation_);
   if (std::isfinite(in.slip_rad_s)) slip_ += kMean * (in.slip_rad_s - slip_);
-  surprised_ = count(surprised_, !(innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation));
+  // A reversed encoder surprises the estimator, too: the check that can name the wheel goes first.
+  surprised_ = count(surprised_,
+                     in.encoders_in_check || !(innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation));
   unhealthy_ = surprised_ > (unhealthy_ ? 0 : ticks(p_.max_innovation_s));
   falling_ = count(falling_, !(in.imu_ok && in.accel_m_s2 < kFreeFall_m_s2));
   const double fastest =

@@ -40,6 +40,8 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   config.estimators.compare = choice.compare;
   if (!choice.attitude.empty()) config.attitude.own = choice.attitude == "own";
   config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
+  if (config.estimators.active == MbbrEstimatorId::kEkf13Published)
+    config.safety.max_innovation = config.safety.max_innovation_published;
   if (choice.backend == "lockstep")
     config.safety.max_identical_samples = 0;  // an engine's IMU may stand still
   // In simulation the firmware is configured for the robot it is on: the level's bridge, and no compensation
@@ -61,6 +63,8 @@ MipConfig MipFirmware::apply(const MipConfig& configured, const Choice& choice) 
   config.estimators.compare = choice.compare;
   if (!choice.attitude.empty()) config.attitude.own = choice.attitude == "own";
   config.safety.needs_attitude = config.estimators.active == MipEstimatorId::kAttitude;
+  if (config.estimators.active == MipEstimatorId::kEkfPublished)
+    config.safety.max_innovation = config.safety.max_innovation_published;
   if (choice.backend == "lockstep") config.safety.max_identical_samples = 0;
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);

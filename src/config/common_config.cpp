@@ -72,6 +72,7 @@ SafetyParams read_safety(Section s) {
   p.min_battery_V = s.number("min_battery_V", 0.0, 60.0);
   p.cutoff_battery_V = s.number("cutoff_battery_V", 0.0, 60.0);
   p.max_innovation = s.number("max_innovation", 1.0, 1000.0);
+  p.max_innovation_published = s.number("max_innovation_published", 1.0, 1000.0);
   p.max_innovation_s = s.number("max_innovation_s", 0.0, 10.0);
   p.encoder_check_drive = s.number("encoder_check_drive", 0.0, 0.6);
   p.max_slip_rad_s = s.number("max_slip_rad_s", 0.1, 1000.0);

@@ -44,7 +44,7 @@ const Fault kFaults[] = {
     {"battery_low", kBatteryLow, 100, [](SafetyInputs& in, MotorCommand&) { in.battery_V = 5.9; }},
     {"battery_cutoff", kBatteryLow, 5, [](SafetyInputs& in, MotorCommand&) { in.battery_V = 5.4; }},
     {"battery_unknown", kBatteryLow, 400, [](SafetyInputs& in, MotorCommand&) { in.battery_ok = false; }},
-    {"estimator", kEstimatorUnhealthy, 65,
+    {"estimator", kEstimatorUnhealthy, 15,
      [](SafetyInputs& in, MotorCommand&) { in.state.normalized_innovation = 500.0; }},
     {"slip", kWheelSlip, 10, [](SafetyInputs& in, MotorCommand&) { in.slip_rad_s = -20.0; }},
     {"picked_up", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.wheel_rate_rad_s[2] = -95.0; }},
@@ -131,23 +131,36 @@ TEST(Safety, EstimatorHealthHasHysteresis) {
   Safety safety(params());
   SafetyInputs in = well();
   in.arm_requested = false;
-  in.state.normalized_innovation = 7.5;
+  in.state.normalized_innovation = 3.5;
   for (int i = 0; i < 100; ++i) safety.gate(half(), in);
   in.arm_requested = true;
-  in.state.normalized_innovation = 3.0;  // below the limit, above half of it
+  in.state.normalized_innovation = 1.5;  // below the limit, above half of it
   for (int i = 0; i < 100; ++i) EXPECT_FALSE(safety.gate(half(), in).enable);
-  in.state.normalized_innovation = 2.0;
+  in.state.normalized_innovation = 1.0;
   for (int i = 0; i < 100; ++i) safety.gate(half(), in);
   EXPECT_TRUE(safety.armed());
 }
 
-TEST(Safety, APushIsNoReasonToDistrustTheEstimator) {
-  Safety safety(params());
+TEST(Safety, APushIsNoReasonToDistrustAPatientEstimator) {
+  SafetyParams patient = params();
+  patient.max_innovation_s = 0.5;
+  Safety safety(patient);
   SafetyInputs surprised = well();
   surprised.state.normalized_innovation = 500.0;
   ASSERT_TRUE(safety.gate(half(), well()).enable);
   for (int i = 0; i < 10; ++i) safety.gate(half(), surprised);
   for (int i = 0; i < 200; ++i) EXPECT_TRUE(safety.gate(half(), well()).enable) << i;
+}
+
+TEST(Safety, TheEncoderCheckGoesBeforeTheEstimator) {
+  Safety safety(params());
+  SafetyInputs in = well();
+  in.encoders_in_check = true;
+  in.state.normalized_innovation = 500.0;
+  for (int i = 0; i < 50; ++i) ASSERT_TRUE(safety.gate(half(), in).enable);
+  in.encoders_in_check = false;
+  for (int i = 0; i < 15; ++i) safety.gate(half(), in);
+  EXPECT_TRUE(safety.reasons() & kEstimatorUnhealthy);
 }
 
 TEST(Safety, AnOldCommandAsksForAStop) {

@@ -32,10 +32,12 @@ class EncoderCheck {
   /// `drive`: of full duty, more than friction takes, less than throws the robot; 0: no check.
   explicit EncoderCheck(double drive) : drive_(drive) {}
 
+  bool running() const noexcept { return tick_ >= 0 && tick_ < kTicks; }
+
   /// What to add to the wheels' drives in this tick.
   Vec<N> drive() const noexcept {
     Vec<N> drive = Vec<N>::Zero();
-    if (tick_ >= 0 && tick_ < kTicks) drive(tick_ / kWindow) = drive_ * sense(tick_ % kWindow);
+    if (running()) drive(tick_ / kWindow) = drive_ * sense(tick_ % kWindow);
     return drive;
   }
 

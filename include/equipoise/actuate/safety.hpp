@@ -38,8 +38,9 @@ struct SafetyParams {
   bool needs_attitude = false;
   double min_battery_V = 6.0;     // for half a second: two LiPo cells
   double cutoff_battery_V = 5.5;  // for five ticks: the supply is going
-  double max_innovation = 5.0;    // normalised innovation, mean over about ten ticks; back below a half: well
-  double max_innovation_s = 0.3;  // above it for longer than a push lasts, or the encoder check
+  double max_innovation = 2.5;    // normalised innovation, mean over about ten ticks; back below a half: well
+  double max_innovation_published = 20.0;  // the same for [T]'s own filter, which trusts itself more
+  double max_innovation_s = 0.05;          // above it for longer
   double encoder_check_drive = 0.3;  // shakes each wheel right after arming; 0: encoders are not checked
   double max_slip_rad_s = 8.0;  // encoders against gyro, where the robot tells; mean over about ten ticks
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
@@ -65,6 +66,7 @@ struct SafetyInputs {
   bool arm_requested = false;
   double command_age_s = 0.0;
   std::uint32_t inhibit = 0;  // SafetyReason bits of the runtime: guard, real time, overruns, calibration
+  bool encoders_in_check = false;    // wheels are being shaken
   std::uint32_t encoders_stuck = 0;  // bit per wheel
   std::uint32_t encoders_reversed = 0;
 };
