@@ -12,20 +12,20 @@ namespace equipoise::generated::mbbr {
 
 /// Physical parameters, SI.
 struct Parameters {
-  double m_t;   // top body
-  double m_b;   // ball
-  double r;     // ball radius
-  double r_w;   // omniwheel radius
-  double l;     // ball centre to the body's centre of mass
+  double m_t;  // top body
+  double m_b;  // ball
+  double r;  // ball radius
+  double r_w;  // omniwheel radius
+  double l;  // ball centre to the body's centre of mass
   double l_az;  // ball centre to the IMU
   double I_t1;  // body about its centre of mass
   double I_t2;
   double I_t3;
-  double I_b;      // ball about its centre
-  double I_w;      // wheels, as seen about the ball
-  double k1;       // torque about the ball per unit of u
+  double I_b;  // ball about its centre
+  double I_w;  // wheels, as seen about the ball
+  double k1;  // torque about the ball per unit of u
   double k2_ball;  // back-EMF about the ball, k2 (r / r_w)^2
-  double mu_v;     // viscous friction about the ball
+  double mu_v;  // viscous friction about the ball
   double g;
 };
 
@@ -142,10 +142,10 @@ inline Coefficients<T> coefficients(const Parameters& p) noexcept {
   c.theta_y_ddot_dtz_px = static_cast<T>(-I_w * (B + C) / D2);
   c.theta_y_ddot_py = static_cast<T>(k_d * (B + C) / D2);
   c.theta_y_ddot_uy = static_cast<T>(-k1 * (B + C) / D2);
-  c.theta_z_ddot_tx_dtz_px =
-      static_cast<T>(I_w * (A2 * B - A2 * I_w - A3 * B - A3 * C - C * C - C * I_w) / (A3 * D2));
-  c.theta_z_ddot_tx_py =
-      static_cast<T>(-k_d * (A2 * B - A2 * I_w - A3 * B - A3 * C - C * C - C * I_w) / (A3 * D2));
+  c.theta_z_ddot_tx_dtz_px = static_cast<T>(I_w * (A2 * B - A2 * I_w - A3 * B - A3 * C - C * C - C * I_w) /
+      (A3 * D2));
+  c.theta_z_ddot_tx_py = static_cast<T>(-k_d * (A2 * B - A2 * I_w - A3 * B - A3 * C - C * C - C * I_w) / (A3 *
+      D2));
   c.theta_z_ddot_tx_uy = static_cast<T>(-k1 * (A2 * I_w + A3 * B + A3 * C + C * I_w) / (A3 * D2));
   c.theta_z_ddot_ty_dtz_py = static_cast<T>(I_w * (A1 * B - A1 * I_w - C * C - C * I_w) / (A3 * D1));
   c.theta_z_ddot_ty_px = static_cast<T>(k_d * (A1 * B - A1 * I_w - C * C - C * I_w) / (A3 * D1));
@@ -172,31 +172,27 @@ inline Coefficients<T> coefficients(const Parameters& p) noexcept {
   c.phi_y_ddot_dtz_px = static_cast<T>(I_w * (A2 + C) / D2);
   c.phi_y_ddot_py = static_cast<T>(-k_d * (A2 + C) / D2);
   c.phi_y_ddot_uy = static_cast<T>(k1 * (A2 + C) / D2);
-  c.accel_x_tx_dtz =
-      static_cast<T>(-k_d * (A2 * I_w * r - A3 * B * l_az + A3 * C * r - C * I_w * l_az) / (A3 * D2));
+  c.accel_x_tx_dtz = static_cast<T>(-k_d * (A2 * I_w * r - A3 * B * l_az + A3 * C * r - C * I_w * l_az) / (A3
+      * D2));
   c.accel_x_tx_uz = static_cast<T>(k1 * (A3 - I_w) * (A2 * r - C * l_az) / (A3 * D2));
-  c.accel_x_ty_dtz2 = static_cast<T>((-A1 * B * l_az + A1 * C * r + A2 * B * l_az - A2 * C * r -
-                                      A2 * I_w * r + A3 * B * l_az - A3 * C * r + C * I_w * l_az) /
-                                     D2);
+  c.accel_x_ty_dtz2 = static_cast<T>((-A1 * B * l_az + A1 * C * r + A2 * B * l_az - A2 * C * r - A2 * I_w * r
+      + A3 * B * l_az - A3 * C * r + C * I_w * l_az) / D2);
   c.accel_x_ty = static_cast<T>((A2 * B * g - B * G * l_az - C * C * g + C * G * r) / D2);
   c.accel_x_dtx_dtz = static_cast<T>((A1 * B * l_az - A1 * C * r - A2 * B * l_az + A2 * C * r + A2 * I_w * r -
-                                      A3 * B * l_az + A3 * C * r - C * I_w * l_az) /
-                                     D2);
+      A3 * B * l_az + A3 * C * r - C * I_w * l_az) / D2);
   c.accel_x_dty = static_cast<T>(-k_d * (A2 * r - B * l_az - C * l_az + C * r) / D2);
   c.accel_x_dtz_px = static_cast<T>(-I_w * (A2 * r - B * l_az - C * l_az + C * r) / D2);
   c.accel_x_py = static_cast<T>(k_d * (A2 * r - B * l_az - C * l_az + C * r) / D2);
   c.accel_x_uy = static_cast<T>(-k1 * (A2 * r - B * l_az - C * l_az + C * r) / D2);
-  c.accel_y_tx_dtz2 = static_cast<T>((-A1 * B * l_az + A1 * C * r + A1 * I_w * r + A2 * B * l_az -
-                                      A2 * C * r - A3 * B * l_az + A3 * C * r - C * I_w * l_az) /
-                                     D1);
+  c.accel_y_tx_dtz2 = static_cast<T>((-A1 * B * l_az + A1 * C * r + A1 * I_w * r + A2 * B * l_az - A2 * C * r
+      - A3 * B * l_az + A3 * C * r - C * I_w * l_az) / D1);
   c.accel_y_tx = static_cast<T>((-A1 * B * g + B * G * l_az + C * C * g - C * G * r) / D1);
-  c.accel_y_ty_dtz =
-      static_cast<T>(-k_d * (A1 * I_w * r - A3 * B * l_az + A3 * C * r - C * I_w * l_az) / (A3 * D1));
+  c.accel_y_ty_dtz = static_cast<T>(-k_d * (A1 * I_w * r - A3 * B * l_az + A3 * C * r - C * I_w * l_az) / (A3
+      * D1));
   c.accel_y_ty_uz = static_cast<T>(k1 * (A3 - I_w) * (A1 * r - C * l_az) / (A3 * D1));
   c.accel_y_dtx = static_cast<T>(k_d * (A1 * r - B * l_az - C * l_az + C * r) / D1);
-  c.accel_y_dty_dtz = static_cast<T>((-A1 * B * l_az + A1 * C * r + A1 * I_w * r + A2 * B * l_az -
-                                      A2 * C * r - A3 * B * l_az + A3 * C * r - C * I_w * l_az) /
-                                     D1);
+  c.accel_y_dty_dtz = static_cast<T>((-A1 * B * l_az + A1 * C * r + A1 * I_w * r + A2 * B * l_az - A2 * C * r
+      - A3 * B * l_az + A3 * C * r - C * I_w * l_az) / D1);
   c.accel_y_dtz_py = static_cast<T>(-I_w * (A1 * r - B * l_az - C * l_az + C * r) / D1);
   c.accel_y_px = static_cast<T>(-k_d * (A1 * r - B * l_az - C * l_az + C * r) / D1);
   c.accel_y_ux = static_cast<T>(k1 * (A1 * r - B * l_az - C * l_az + C * r) / D1);
@@ -205,7 +201,8 @@ inline Coefficients<T> coefficients(const Parameters& p) noexcept {
 
 /// a = (theta_x'', theta_y'', theta_z'', ball x, ball y: inertial) and J = da/dx.
 template <class T>
-inline void accelerations(const Coefficients<T>& c, const T x[7], const T u[3], T a[5], T J[5][7]) noexcept {
+inline void accelerations(const Coefficients<T>& c, const T x[7], const T u[3],
+                          T a[5], T J[5][7]) noexcept {
   const T tx = x[0];
   const T ty = x[1];
   const T dtx = x[2];
@@ -276,7 +273,8 @@ inline void accelerations(const Coefficients<T>& c, const T x[7], const T u[3], 
 
 /// y = x and y of R^T(-g e3 - a) at the IMU, [T] (5.26), and J = dy/dx.
 template <class T>
-inline void accelerometer(const Coefficients<T>& c, const T x[7], const T u[3], T y[2], T J[2][7]) noexcept {
+inline void accelerometer(const Coefficients<T>& c, const T x[7], const T u[3],
+                          T y[2], T J[2][7]) noexcept {
   const T tx = x[0];
   const T ty = x[1];
   const T dtx = x[2];

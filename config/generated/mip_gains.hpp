@@ -36,23 +36,26 @@ struct Lqr {
 };
 
 /// Designed here, for 200 Hz.
-inline constexpr Slc kSlc{200.0,
-                          {-19.281429, 34.208571, -15.081429, -1.1428571, 0.14285714},
-                          {0.039605911, 0.00039408867, -0.039211823, -1.3037767, 0.32348112},
-                          0.92959404,
-                          0.056451299};
+inline constexpr Slc kSlc{
+    200.0,
+    {-19.281429, 34.208571, -15.081429, -1.1428571, 0.14285714},
+    {0.039605911, 0.00039408867, -0.039211823, -1.3037767, 0.32348112},
+    0.92959404,
+    0.056451299};
 
 /// As published with the robot's library, for 100 Hz.
-inline constexpr Slc kSlcPublished{100.0,
-                                   {-4.945, 8.862, -3.967, -1.481, 0.4812},
-                                   {0.18856, -0.37209, 0.18354, -1.86046, 0.86046},
-                                   1.0,
-                                   0.05};
+inline constexpr Slc kSlcPublished{
+    100.0,
+    {-4.945, 8.862, -3.967, -1.481, 0.4812},
+    {0.18856, -0.37209, 0.18354, -1.86046, 0.86046},
+    1.0,
+    0.05};
 
-inline constexpr Lqr kLqr{-6.811978, -0.43235447, -0.76127896, -0.24193701, 0.92959404, 0.056451299};
+inline constexpr Lqr kLqr{-6.811978, -0.43235447, -0.76127896,
+                          -0.24193701, 0.92959404, 0.056451299};
 
 // Against back-EMF.
-inline constexpr double kSpeed = 0.025;           // k2 / k1
+inline constexpr double kSpeed = 0.025;  // k2 / k1
 inline constexpr double kYawFeedforward = 0.025;  // d k2 / (2 r k1)
 
 }  // namespace equipoise::generated::mip

@@ -10,18 +10,18 @@ namespace equipoise::generated::mip {
 
 /// Physical parameters, SI.
 struct Parameters {
-  double m_b;   // body
-  double m_w;   // one wheel
-  double r;     // wheel radius
-  double d;     // distance between the wheels
-  double l;     // axle to the body's centre of mass
+  double m_b;  // body
+  double m_w;  // one wheel
+  double r;  // wheel radius
+  double d;  // distance between the wheels
+  double l;  // axle to the body's centre of mass
   double I_b1;  // body about its centre of mass; 1: along the axle
   double I_b2;
   double I_b3;
   double I_w1;  // one wheel about its axle
   double I_w2;  // one wheel across its axle
-  double k1;    // torque of one motor per unit of u
-  double k2;    // back-EMF of one motor
+  double k1;  // torque of one motor per unit of u
+  double k2;  // back-EMF of one motor
   double g;
   double l_ay;  // axle to the IMU
   double l_az;
@@ -87,9 +87,8 @@ inline Coefficients<T> coefficients(const Parameters& p) noexcept {
   c.psi_ddot_th_dph_dps = static_cast<T>(-S / Z);
   c.psi_ddot_dps = static_cast<T>(-d * d * k2 / (2.0 * Z * r * r));
   c.psi_ddot_uz = static_cast<T>(d * k1 / (Z * r));
-  c.accel_y_th_dps2 = static_cast<T>((A * S * r - A * W * l_az + B * B * l_az - B * C * r - B * S * l_az -
-                                      2.0 * B * S * r + C * W * l_az + C * W * r + S * W * l_az + S * W * r) /
-                                     D);
+  c.accel_y_th_dps2 = static_cast<T>((A * S * r - A * W * l_az + B * B * l_az - B * C * r - B * S * l_az - 2.0
+      * B * S * r + C * W * l_az + C * W * r + S * W * l_az + S * W * r) / D);
   c.accel_y_th = static_cast<T>((-A * W * g + B * B * g - B * G * r + G * W * l_az + G * W * r) / D);
   c.accel_y_dph = static_cast<T>(-2.0 * k2 * (A * r - B * l_az - B * r) / D);
   c.accel_y_dps2 = static_cast<T>(l_ay);
@@ -99,7 +98,8 @@ inline Coefficients<T> coefficients(const Parameters& p) noexcept {
 
 /// a = (theta'', phi'', psi'') and J = da/dx; [T] (3.25).
 template <class T>
-inline void accelerations(const Coefficients<T>& c, const T x[4], const T u[2], T a[3], T J[3][4]) noexcept {
+inline void accelerations(const Coefficients<T>& c, const T x[4], const T u[2],
+                          T a[3], T J[3][4]) noexcept {
   const T th = x[0];
   const T dph = x[2];
   const T dps = x[3];
@@ -130,7 +130,8 @@ inline void accelerations(const Coefficients<T>& c, const T x[4], const T u[2], 
 
 /// y = y of R^T(-g e3 - a) at the IMU, [T] (3.27) at (l_ay, l_az), and J = dy/dx.
 template <class T>
-inline void accelerometer(const Coefficients<T>& c, const T x[4], const T u[2], T y[1], T J[1][4]) noexcept {
+inline void accelerometer(const Coefficients<T>& c, const T x[4], const T u[2],
+                          T y[1], T J[1][4]) noexcept {
   const T th = x[0];
   const T dph = x[2];
   const T dps = x[3];
@@ -147,8 +148,8 @@ inline void accelerometer(const Coefficients<T>& c, const T x[4], const T u[2], 
 
 /// Without yaw: x = (theta, theta', phi'), u = (u_x), a = (theta'', phi'').
 template <class T>
-inline void planar_accelerations(const Coefficients<T>& c, const T x[3], const T u[1], T a[2],
-                                 T J[2][3]) noexcept {
+inline void planar_accelerations(const Coefficients<T>& c, const T x[3], const T u[1],
+                                 T a[2], T J[2][3]) noexcept {
   const T th = x[0];
   const T dph = x[2];
   const T ux = u[0];
@@ -166,8 +167,8 @@ inline void planar_accelerations(const Coefficients<T>& c, const T x[3], const T
 
 /// Without yaw: y of R^T(-g e3 - a) at the IMU.
 template <class T>
-inline void planar_accelerometer(const Coefficients<T>& c, const T x[3], const T u[1], T y[1],
-                                 T J[1][3]) noexcept {
+inline void planar_accelerometer(const Coefficients<T>& c, const T x[3], const T u[1],
+                                 T y[1], T J[1][3]) noexcept {
   const T th = x[0];
   const T dph = x[2];
   const T ux = u[0];

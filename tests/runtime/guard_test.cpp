@@ -3,6 +3,7 @@
 #include "app/guard.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -49,6 +50,7 @@ class GuardProcess : public ::testing::Test {
   void TearDown() override {
     end(loop_);
     end(guard_);
+    shm_unlink(name_.c_str());  // a killed guard leaves its page
     page_.reset();
     std::filesystem::remove_all(dir_);
   }
