@@ -92,12 +92,12 @@ std::string exactly(double value) {
 void read_battery(Section s, Board* board) {
   copy_text(s, "adc", board->wiring.adc);
   board->wiring.battery_channel = static_cast<std::uint32_t>(s.integer("channel", 0, 7));
-  const double scale = s.number("V_per_count", 1e-6, 1.0);
-  const double offset = s.number("offset_V", -5.0, 5.0);
+  board->battery_V_per_count = s.number("V_per_count", 1e-6, 1.0);
+  board->battery_offset_V = s.number("offset_V", -5.0, 5.0);
   board->wiring.battery_every_ticks = static_cast<std::uint32_t>(s.integer("every_ticks", 1, 200));
   s.finish();
-  board->calibration.push_back("calibration.battery_V_per_count=" + exactly(scale));
-  board->calibration.push_back("calibration.battery_offset_V=" + exactly(offset));
+  board->calibration.push_back("calibration.battery_V_per_count=" + exactly(board->battery_V_per_count));
+  board->calibration.push_back("calibration.battery_offset_V=" + exactly(board->battery_offset_V));
 }
 
 void read_panel(Section& root, Board* board) {

@@ -21,6 +21,8 @@ struct Board {
   std::vector<BoardLine> led_bars;
   BoardLine button_pause, button_mode;
   bool buttons_active_low = true;
+  double battery_V_per_count = 0.0;
+  double battery_offset_V = 0.0;
   int dc_jack_channel = 0;
   std::string serial_device;
   int serial_baud = 0;

@@ -14,6 +14,7 @@ void add_commands(CLI::App& app, int* status) {
   add_geometry(app, status);
   add_attitude(app, status);
   add_motor_bench(app, status);
+  add_doctor(app, status);
 }
 
 }  // namespace equipoise::app

@@ -26,6 +26,7 @@ void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);
 void add_attitude(CLI::App& app, int* status);
 void add_motor_bench(CLI::App& app, int* status);
+void add_doctor(CLI::App& app, int* status);
 
 /// A whole file; InputError names it.
 std::string read_text(const std::string& path);
