@@ -15,6 +15,8 @@ void add_commands(CLI::App& app, int* status) {
   add_attitude(app, status);
   add_motor_bench(app, status);
   add_doctor(app, status);
+  add_calibrate(app, status);
+  add_bringup(app, status);
 }
 
 }  // namespace equipoise::app
