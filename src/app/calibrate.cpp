@@ -143,11 +143,11 @@ Result calibrate_motors(Workbench& bench, CalibrationFile* file) {
   for (const WheelFinding& f : findings) {
     motors.wheel_of_motor.push_back(*f.wheel + 1);
     motors.encoder_of_motor.push_back(f.encoder + 1);
-    motors.duty.push_back(f.duty);
+    motors.drive.push_back(f.drive);
     result.text += (result.text.empty() ? "" : "\n") + describe(f);
     result.json["motors"].push_back({{"wheel", *f.wheel + 1},
                                      {"encoder", f.encoder + 1},
-                                     {"duty", f.duty},
+                                     {"drive", f.drive},
                                      {"turns_backwards", *f.turns_backwards},
                                      {"counts_down", f.counts_down},
                                      {"kick_sigmas", f.kick_sigmas}});

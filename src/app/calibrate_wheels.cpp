@@ -7,8 +7,9 @@
 namespace equipoise::app {
 namespace {
 
-constexpr double kMaxDuty = 0.35;            // a stalled motor: 0.8 A of the MBBR's 2.4 A
-constexpr double kRamp_s = 0.5;              // from 0 to kMaxDuty
+// Of the stall torque: 0.8 A of the MBBR's 2.4 A. A drive/coast bridge needs a larger duty for it.
+constexpr double kMaxDrive = 0.35;
+constexpr double kRamp_s = 0.5;              // from 0 to kMaxDrive
 constexpr double kMoved_turns = 1.0 / 36.0;  // 10 degrees: more than any gear's play
 constexpr double kMaxTravel_turns = 0.5;
 constexpr double kShareOfOthers = 0.2;  // a second wheel that moves by this share moves too
@@ -45,9 +46,10 @@ std::size_t largest(const std::array<double, kMaxMotors>& values) {
   return best;
 }
 
-std::array<double, kMaxMotors> only(int motor, double duty) {
+/// Duties for this share of the stall torque of one motor, at rest.
+std::array<double, kMaxMotors> only(const WheelLayout& layout, int motor, double drive) {
   std::array<double, kMaxMotors> duties{};
-  duties[static_cast<std::size_t>(motor)] = duty;
+  duties[static_cast<std::size_t>(motor)] = Bridge(layout.motor).invert(drive, 0.0, layout.motor.nominal_V);
   return duties;
 }
 
@@ -56,8 +58,8 @@ void find_breakaway(Session& session, const WheelLayout& layout, WheelFinding* f
   const RawSample start = session.sample();
   const int ticks = static_cast<int>(std::lround(kRamp_s * kTickHz));
   for (int tick = 1; tick <= ticks; ++tick) {
-    finding->duty = kMaxDuty * tick / ticks;
-    const auto turns = travel(start, session.drive(only(finding->motor, finding->duty)), layout);
+    finding->drive = kMaxDrive * tick / ticks;
+    const auto turns = travel(start, session.drive(only(layout, finding->motor, finding->drive)), layout);
     const std::size_t most = largest(turns);
     if (std::abs(turns[most]) < kMoved_turns) continue;
     session.off();
@@ -75,9 +77,9 @@ void find_breakaway(Session& session, const WheelLayout& layout, WheelFinding* f
   }
   session.off();
   throw JobError(
-      format("motor %d: no encoder moves up to %.0f %% duty: battery, motor plug, encoder plug, or the "
+      format("motor %d: no encoder moves up to %.0f %% torque: battery, motor plug, encoder plug, or the "
              "wheel is held",
-             finding->motor + 1, 100.0 * kMaxDuty));
+             finding->motor + 1, 100.0 * kMaxDrive));
 }
 
 struct Kick {
@@ -92,7 +94,7 @@ Kick shake(Session& session, const WheelLayout& layout, const Calibration& c, co
   const Vec3 bias = c.R_BS * (c.gyro_rad_s_per_count * rest.gyro);
   const double sigma =
       c.gyro_rad_s_per_count * std::max(rest.gyro_sigma.norm(), 0.5);  // half a count at least
-  const double duty = std::min(1.6 * finding.duty, kMaxDuty);
+  const double drive = std::min(1.6 * finding.drive, kMaxDrive);
   const double rad_per_count = (finding.counts_down ? -2.0 : 2.0) * kPi / layout.counts_per_rev;
   const auto k = static_cast<std::size_t>(finding.encoder);
   const RawSample start = session.sample();
@@ -101,7 +103,7 @@ Kick shake(Session& session, const WheelLayout& layout, const Calibration& c, co
   Vec3 products = Vec3::Zero();
   for (const double sense : kSense) {
     for (int i = 0; i < kStroke_ticks; ++i) {
-      const RawSample raw = session.drive(only(finding.motor, sense * duty));
+      const RawSample raw = session.drive(only(layout, finding.motor, sense * drive));
       const Vec3 gyro = gyro_of(raw, c) - bias;
       const double rate = rad_per_count * (raw.encoder_counts[k] - last) * kTickHz;
       last = raw.encoder_counts[k];
@@ -154,22 +156,26 @@ bool WheelLayout::told_apart_by_gyro() const {
   return true;
 }
 
-WheelLayout layout_of(const MbbrParameters& robot, const Calibration& calibration) {
+WheelLayout layout_of(const MbbrParameters& robot, const MotorParameters& motor,
+                      const Calibration& calibration) {
   WheelLayout layout;
   layout.wheels = Mbbr::kWheels;
   const MbbrKinematics kinematics(robot);
   for (int i = 0; i < layout.wheels; ++i)
     layout.axis_B[static_cast<std::size_t>(i)] = -kinematics.T_ob().col(i);
   layout.body_inertia_kg_m2 = {robot.I_t1, robot.I_t2, robot.I_t3};
+  layout.motor = motor;
   layout.counts_per_rev = calibration.encoder_counts_per_rev;
   return layout;
 }
 
-WheelLayout layout_of(const MipParameters& robot, const Calibration& calibration) {
+WheelLayout layout_of(const MipParameters& robot, const MotorParameters& motor,
+                      const Calibration& calibration) {
   WheelLayout layout;
   layout.wheels = Mip::kWheels;
   layout.axis_B.fill(Vec3::UnitX());  // x points along the axle; turning about +x rolls the robot forwards
   layout.body_inertia_kg_m2 = {robot.I_b1, robot.I_b2, robot.I_b3};
+  layout.motor = motor;
   layout.counts_per_rev = calibration.encoder_counts_per_rev;
   return layout;
 }
@@ -215,8 +221,8 @@ void settle(Session& session, const WheelLayout& layout, std::vector<WheelFindin
 }
 
 std::string describe(const WheelFinding& f) {
-  std::string text = format("motor %d: moves at %.0f %% duty, encoder %d counts %s", f.motor + 1,
-                            100.0 * f.duty, f.encoder + 1, f.counts_down ? "down" : "up");
+  std::string text = format("motor %d: moves at %.0f %% torque, encoder %d counts %s", f.motor + 1,
+                            100.0 * f.drive, f.encoder + 1, f.counts_down ? "down" : "up");
   text += f.wheel ? format(", wheel %d", *f.wheel + 1) : ", wheel unknown";
   if (f.turns_backwards) text += *f.turns_backwards ? " turns backwards" : " turns forwards";
   return text + format(" (felt by the gyro: %.0f sigma)", f.kick_sigmas);

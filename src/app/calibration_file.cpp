@@ -63,7 +63,7 @@ CalibrationFile read(const Document& document) {
   if (root.has("motors")) {
     Section s = root.table("motors");
     file.motors = {read_stamp(s), read_indices(s, "wheel_of_motor", wheels),
-                   read_indices(s, "encoder_of_motor", wheels), s.numbers("duty", wheels, 0.0, 1.0)};
+                   read_indices(s, "encoder_of_motor", wheels), s.numbers("drive", wheels, 0.0, 1.0)};
     s.finish();
   }
   if (root.has("encoders")) {
@@ -155,7 +155,7 @@ std::string to_toml(const CalibrationFile& file) {
     text += "\n[motors]\n" + text_of(file.motors->stamp) +
             "wheel_of_motor = " + indices_of(file.motors->wheel_of_motor) +
             "\nencoder_of_motor = " + indices_of(file.motors->encoder_of_motor) +
-            "\nduty = " + toml_array(file.motors->duty) + "\n";
+            "\ndrive = " + toml_array(file.motors->drive) + "\n";
   }
   if (file.encoders) {
     text += "\n[encoders]\n" + text_of(file.encoders->stamp) +

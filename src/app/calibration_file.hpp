@@ -34,7 +34,7 @@ struct CalibrationFile {
   struct Motors {  // what was seen, from 1; the board file holds the wiring
     Stamp stamp;
     std::vector<int> wheel_of_motor, encoder_of_motor;
-    std::vector<double> duty;
+    std::vector<double> drive;  // of the stall torque, that moved them
   };
   struct Encoders {
     Stamp stamp;

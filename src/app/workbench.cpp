@@ -70,7 +70,7 @@ Workbench::Workbench(const WorkbenchArguments& a) : robot_(robot_type(a.config))
   with_robot(robot_, a.config, [&](auto firmware) {
     using Firmware = decltype(firmware);
     const auto config = Firmware::load(a.config, board_.calibration).config;
-    setup_.layout = layout_of(config.robot, config.calibration);
+    setup_.layout = layout_of(config.robot, config.motor, config.calibration);
     setup_.tip_axis_B = tip_axis(config.robot);
     setup_.motor = config.motor;
     setup_.calibration = config.calibration;
