@@ -36,7 +36,8 @@ def package(folder: Path, content: str, architecture="armhf") -> Path:
     tree = folder / content / "DEBIAN"
     tree.mkdir(parents=True, exist_ok=True)
     (tree / "control").write_text(
-        f"Package: equipoise\nVersion: 1\nArchitecture: {architecture}\nMaintainer: A <a@b.c>\nDescription: x\n"
+        f"Package: equipoise\nVersion: 1\nArchitecture: {architecture}\n"
+        "Maintainer: A <a@b.c>\nDescription: x\n"
     )
     file = folder / f"{content}.deb"
     subprocess.run(["dpkg-deb", "-Znone", "-b", tree.parent, file], check=True, capture_output=True)
