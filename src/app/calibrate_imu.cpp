@@ -42,7 +42,7 @@ GyroBias gyro_bias(const Stillness& still, const Calibration& scale) {
       throw JobError(format("wheel %d turned by %.0f counts; keep hands off", static_cast<int>(i) + 1,
                             still.encoder_travel[i]));
   }
-  const GyroBias bias{k * still.gyro, k * still.gyro_sigma};
+  GyroBias bias{k * still.gyro, k * still.gyro_sigma};
   const double largest = bias.bias_S_rad_s.cwiseAbs().maxCoeff();
   if (largest > kMaxBias_rad_s) {
     throw JobError(

@@ -1,6 +1,6 @@
-// The service manager's watchdog (systemd, sd_notify protocol): says "ready" at the first tick, then "alive" as
-// long as ticks come. In: tick numbers -> out: datagrams to $NOTIFY_SOCKET from a thread of its own; without
-// the variable, nothing. tick() is RT-safe: one atomic store.
+// The service manager's watchdog (systemd, sd_notify protocol): says "ready" at the first tick, then "alive"
+// as long as ticks come. In: tick numbers -> out: datagrams to $NOTIFY_SOCKET from a thread of its own;
+// without the variable, nothing. tick() is RT-safe: one atomic store.
 #pragma once
 
 #include <atomic>
