@@ -40,6 +40,7 @@ std::vector<WheelFinding> pulse_all(Workbench& bench) {
                 "hang the robot up by its head or lay it on soft foam, wheels free; they will turn a little. "
                 "Then press Enter"});
   std::vector<WheelFinding> findings;
+  findings.reserve(static_cast<std::size_t>(bench.layout().wheels));
   for (int i = 0; i < bench.layout().wheels; ++i)
     findings.push_back(pulse(*session, bench.layout(), bench.calibration(), i));
   settle(*session, bench.layout(), &findings);

@@ -26,7 +26,6 @@ struct Arguments {
 };
 
 struct Result {
-  nlohmann::json json;
   std::string text;
   std::string complaint;  // empty: all is as the files say
 };
@@ -40,14 +39,14 @@ std::string format(const char* text, Args... args) {
   return out;
 }
 
-Result calibrate_gyro(Workbench& bench, CalibrationFile* file) {
+Result calibrate_gyro(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
   const auto session = bench.open();
   const Stillness still = session->hold_still(kGyro_s);
   const GyroBias found = gyro_bias(still, bench.calibration());
   file->gyro = {stamp_of(still.temperature_degC), found.bias_S_rad_s, found.sigma_S_rad_s};
   const Vec3 deg = found.bias_S_rad_s * 180.0 / kPi;
-  return {{{"bias_rad_s", json_of(found.bias_S_rad_s)}, {"sigma_rad_s", json_of(found.sigma_S_rad_s)}},
-          format("gyro bias %.3f %.3f %.3f deg/s, noise %.3f deg/s", deg.x(), deg.y(), deg.z(),
+  *json = {{"bias_rad_s", json_of(found.bias_S_rad_s)}, {"sigma_rad_s", json_of(found.sigma_S_rad_s)}};
+  return {format("gyro bias %.3f %.3f %.3f deg/s, noise %.3f deg/s", deg.x(), deg.y(), deg.z(),
                  found.sigma_S_rad_s.maxCoeff() * 180.0 / kPi),
           ""};
 }
@@ -60,7 +59,7 @@ Vec3 pose(Session& session, const Calibration& c, double* temperature_degC) {
   return c.accel_m_s2_per_count * still.accel;
 }
 
-Result calibrate_accel(Workbench& bench, CalibrationFile* file) {
+Result calibrate_accel(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
   const auto session = bench.open();
   std::vector<Vec3> poses;
   std::array<bool, 6> seen{};
@@ -93,13 +92,13 @@ Result calibrate_accel(Workbench& bench, CalibrationFile* file) {
   const AccelFit fit = fit_six_faces(poses, check);
   file->accel = {stamp_of(temperature), fit.scale_S, fit.bias_S_m_s2, fit.check_error_m_s2};
   const double mg = 1000.0 * fit.check_error_m_s2 / kGravity_m_s2;
+  *json = {{"scale", json_of(fit.scale_S)},
+           {"bias_m_s2", json_of(fit.bias_S_m_s2)},
+           {"check_error_mg", mg},
+           {"quality", mg < 5.0    ? "good"
+                       : mg < 15.0 ? "fair"
+                                   : "poor"}};
   return {
-      {{"scale", json_of(fit.scale_S)},
-       {"bias_m_s2", json_of(fit.bias_S_m_s2)},
-       {"check_error_mg", mg},
-       {"quality", mg < 5.0    ? "good"
-                   : mg < 15.0 ? "fair"
-                               : "poor"}},
       format(
           "accelerometer scale %.4f %.4f %.4f, bias %.3f %.3f %.3f m/s2; off by %.1f mg in a pose it was not "
           "fitted to",
@@ -108,7 +107,7 @@ Result calibrate_accel(Workbench& bench, CalibrationFile* file) {
       mg < 15.0 ? "" : "the fit is poor: repeat it on a firm table"};
 }
 
-Result calibrate_mount(Workbench& bench, CalibrationFile* file) {
+Result calibrate_mount(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
   const auto session = bench.open();
   double temperature = 0.0;
   const auto corrected = [&](const Vec3& a) {
@@ -125,32 +124,32 @@ Result calibrate_mount(Workbench& bench, CalibrationFile* file) {
       180.0 / kPi;
   nlohmann::json rows = nlohmann::json::array();
   for (int i = 0; i < 9; ++i) rows.push_back(R_BS(i / 3, i % 3));
-  return {{{"R_BS", rows}, {"degrees_from_board_file", off}},
-          format("the IMU sits %.1f degrees from where the board file says", off),
-          ""};
+  *json = {{"R_BS", rows}, {"degrees_from_board_file", off}};
+  return {format("the IMU sits %.1f degrees from where the board file says", off), ""};
 }
 
-Result calibrate_motors(Workbench& bench, CalibrationFile* file) {
+Result calibrate_motors(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
   const auto session = bench.open();
   const double temperature = session->hold_still(0.1).temperature_degC;
   std::vector<WheelFinding> findings;
+  findings.reserve(static_cast<std::size_t>(bench.layout().wheels));
   for (int i = 0; i < bench.layout().wheels; ++i)
     findings.push_back(pulse(*session, bench.layout(), bench.calibration(), i));
   settle(*session, bench.layout(), &findings);
   Result result;
   CalibrationFile::Motors motors{stamp_of(temperature), {}, {}, {}};
-  result.json["motors"] = nlohmann::json::array();
+  (*json)["motors"] = nlohmann::json::array();
   for (const WheelFinding& f : findings) {
     motors.wheel_of_motor.push_back(*f.wheel + 1);
     motors.encoder_of_motor.push_back(f.encoder + 1);
     motors.drive.push_back(f.drive);
     result.text += (result.text.empty() ? "" : "\n") + describe(f);
-    result.json["motors"].push_back({{"wheel", *f.wheel + 1},
-                                     {"encoder", f.encoder + 1},
-                                     {"drive", f.drive},
-                                     {"turns_backwards", *f.turns_backwards},
-                                     {"counts_down", f.counts_down},
-                                     {"kick_sigmas", f.kick_sigmas}});
+    (*json)["motors"].push_back({{"wheel", *f.wheel + 1},
+                                 {"encoder", f.encoder + 1},
+                                 {"drive", f.drive},
+                                 {"turns_backwards", *f.turns_backwards},
+                                 {"counts_down", f.counts_down},
+                                 {"kick_sigmas", f.kick_sigmas}});
   }
   file->motors = motors;
   result.complaint = complaint(findings);
@@ -158,7 +157,7 @@ Result calibrate_motors(Workbench& bench, CalibrationFile* file) {
   return result;
 }
 
-Result calibrate_encoders(Workbench& bench, CalibrationFile* file) {
+Result calibrate_encoders(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
   const auto session = bench.open();
   CalibrationFile::Encoders encoders{stamp_of(session->hold_still(0.1).temperature_degC), {}};
   Result result;
@@ -179,7 +178,7 @@ Result calibrate_encoders(Workbench& bench, CalibrationFile* file) {
                  wheel + 1, std::abs(found.counts_per_rev), expected));
     }
   }
-  result.json["counts_per_rev"] = encoders.counts_per_rev;
+  (*json)["counts_per_rev"] = encoders.counts_per_rev;
   file->encoders = encoders;
   return result;
 }
@@ -190,19 +189,19 @@ int run_calibrate(const Arguments& a) {
   if (std::filesystem::exists(a.out)) file = load_calibration(a.out, bench.robot());
   file.robot = bench.robot();
   file.wheel_count = bench.layout().wheels;
-  Result result = a.what == "gyro"     ? calibrate_gyro(bench, &file)
-                  : a.what == "accel"  ? calibrate_accel(bench, &file)
-                  : a.what == "mount"  ? calibrate_mount(bench, &file)
-                  : a.what == "motors" ? calibrate_motors(bench, &file)
-                                       : calibrate_encoders(bench, &file);
+  nlohmann::json json;
+  const Result result = a.what == "gyro"     ? calibrate_gyro(bench, &file, &json)
+                        : a.what == "accel"  ? calibrate_accel(bench, &file, &json)
+                        : a.what == "mount"  ? calibrate_mount(bench, &file, &json)
+                        : a.what == "motors" ? calibrate_motors(bench, &file, &json)
+                                             : calibrate_encoders(bench, &file, &json);
   save_calibration(file, a.out);
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   std::fprintf(out, "%s\nwritten to %s\n", result.text.c_str(), a.out.c_str());
-  result.json["what"] = a.what;
-  result.json["file"] = a.out;
-  result.json["complaint"] =
-      result.complaint.empty() ? nlohmann::json(nullptr) : nlohmann::json(result.complaint);
-  if (!a.json.empty()) write_json(result.json, a.json);
+  json["what"] = a.what;
+  json["file"] = a.out;
+  json["complaint"] = result.complaint.empty() ? nlohmann::json(nullptr) : nlohmann::json(result.complaint);
+  if (!a.json.empty()) write_json(json, a.json);
   if (result.complaint.empty()) return 0;
   std::fprintf(stderr, "equipoise: %s\n", result.complaint.c_str());
   return 1;

@@ -126,7 +126,7 @@ CalibrationFile load_calibration(const std::string& path, const std::string& rob
   if (!std::filesystem::exists(path))
     throw ConfigError(
         path + ": named by the board file but missing; make it with equipoise calibrate gyro --out " + path);
-  const CalibrationFile file = parse_calibration(read_text(path), path);
+  CalibrationFile file = parse_calibration(read_text(path), path);
   if (file.robot != robot)
     throw ConfigError(path + ": robot: \"" + file.robot + "\" where the board file says \"" + robot + "\"");
   return file;
