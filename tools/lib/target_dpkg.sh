@@ -24,7 +24,9 @@ target_dpkg() {
     for file in shlibs symbols md5sums; do
       [ ! -e "$info/control/$file" ] || cp "$info/control/$file" "$database/info/$entry.$file"
     done
-    dpkg-deb --fsys-tarfile "$deb" | tar -t | sed "s|^\.||; s|/\$||; s|^|$sysroot|" >"$database/info/$entry.list"
+    # The sysroot's lib is a link to usr/lib, as on the target.
+    dpkg-deb --fsys-tarfile "$deb" | tar -t | sed "s|^\.||; s|/\$||; s|^/lib/|/usr/lib/|; s|^|$sysroot|" \
+      >"$database/info/$entry.list"
   done
   rm -rf "$info"
 }
