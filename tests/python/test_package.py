@@ -57,6 +57,12 @@ def test_the_service_is_understood_and_gives_what_the_doctor_asks_for(root, tmp_
     unit = (root / "packaging/equipoise.service").read_text()
     for line in ("Type=notify", "WatchdogSec=2", "LimitRTPRIO=99", "LimitMEMLOCK=infinity", "Restart=no"):
         assert f"\n{line}\n" in unit
+    after = re.search(r"^ExecStopPost=/bin/sh -c '(.*)'$", unit, re.M)[1].replace("$$", "$")
+    for channel in ("pwm0", "pwm-7:1"):
+        (tmp_path / "pwmchip7" / channel).mkdir(parents=True)
+        (tmp_path / "pwmchip7" / channel / "enable").write_text("1")
+    subprocess.run(["/bin/sh", "-c", after.replace("/sys/class/pwm", str(tmp_path))], check=True)
+    assert [f.read_text() for f in tmp_path.glob("pwmchip7/*/enable")] == ["0\n", "0\n"]
     options = re.findall(r" (--[a-z-]+)", re.search(r"^ExecStart=.*$", unit, re.M)[0])
     help_text = subprocess.run(
         [root / "build/host/equipoise", "run", "--help"], capture_output=True, text=True
