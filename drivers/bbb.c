@@ -54,6 +54,7 @@ static void read_imu(bbb_t* bbb, rio_sensors_t* out) {
     out->gyro_counts[i] = bbb->gyro_scale * (double)sample.gyro[i];
     out->accel_counts[i] = bbb->accel_scale * (double)sample.accel[i];
   }
+  out->imu_temperature_degC = 21.0 + (double)sample.temperature / 333.87; /* RM-MPU-9250A, 4.23 */
   if ((sample.flags & MPU9250_CLIPPED) != 0)
     out->health |= RIO_IMU_CLIPPED; /* an end value is still a value */
   if ((sample.flags & MPU9250_STUCK) != 0) {

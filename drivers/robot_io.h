@@ -44,6 +44,7 @@ typedef struct rio_sensors {
   double accel_counts[3];                /* sensor axes, specific force, 4096 counts per g at +-8 g */
   double encoder_counts[RIO_MAX_MOTORS]; /* unwrapped, motor order */
   double battery_counts;                 /* ADC counts */
+  double imu_temperature_degC;           /* of the chip; 0 where unknown */
   double attitude_wxyz[4];               /* unit quaternion R_WS of the attitude source */
   uint32_t valid;                        /* enum rio_valid */
   uint32_t health;                       /* enum rio_health */

@@ -1,8 +1,10 @@
 #include "board.hpp"
 
-#include <cstdio>
+#include <algorithm>
 #include <cstring>
+#include <filesystem>
 
+#include "calibration_file.hpp"
 #include "config/toml_reader.hpp"
 
 namespace equipoise::app {
@@ -81,23 +83,16 @@ bbb_motor_t read_motor(Section& s) {
   return motor;
 }
 
-std::string exactly(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  // A TOML float needs a point or an exponent.
-  return std::strpbrk(text, ".e") != nullptr ? text : std::string(text) + ".0";
-}
-
 /// Battery scale, and the channel's own entries.
 void read_battery(Section s, Board* board) {
   copy_text(s, "adc", board->wiring.adc);
   board->wiring.battery_channel = static_cast<std::uint32_t>(s.integer("channel", 0, 7));
-  const double scale = s.number("V_per_count", 1e-6, 1.0);
-  const double offset = s.number("offset_V", -5.0, 5.0);
+  board->battery_V_per_count = s.number("V_per_count", 1e-6, 1.0);
+  board->battery_offset_V = s.number("offset_V", -5.0, 5.0);
   board->wiring.battery_every_ticks = static_cast<std::uint32_t>(s.integer("every_ticks", 1, 200));
   s.finish();
-  board->calibration.push_back("calibration.battery_V_per_count=" + exactly(scale));
-  board->calibration.push_back("calibration.battery_offset_V=" + exactly(offset));
+  board->calibration.push_back("calibration.battery_V_per_count=" + toml_number(board->battery_V_per_count));
+  board->calibration.push_back("calibration.battery_offset_V=" + toml_number(board->battery_offset_V));
 }
 
 void read_panel(Section& root, Board* board) {
@@ -136,13 +131,13 @@ Board read_board(const Document& document) {
   Board board;
   Section about = root.table("board");
   board.robot = about.text("robot");
+  if (about.has("calibration")) board.calibration_file = about.text("calibration");
   about.finish();
 
   Section imu = root.table("imu");
-  std::string mount;
-  for (const double value : imu.numbers("R_BS", 9, -1.0, 1.0))
-    mount += (mount.empty() ? "" : ", ") + exactly(value);
-  board.calibration.push_back("calibration.R_BS=[" + mount + "]");
+  const std::vector<double> mount = imu.numbers("R_BS", 9, -1.0, 1.0);
+  std::copy(mount.begin(), mount.end(), board.R_BS.begin());
+  board.calibration.push_back("calibration.R_BS=" + toml_array(mount));
   board.wiring.imu = read_imu(imu);
 
   Section bridges = root.table("bridges");
@@ -161,7 +156,16 @@ Board read_board(const Document& document) {
 
 }  // namespace
 
-Board load_board(const std::string& path) { return read_board(Document(path, {})); }
+Board load_wiring(const std::string& path) { return read_board(Document(path, {})); }
+
+Board load_board(const std::string& path) {
+  Board board = load_wiring(path);
+  if (board.calibration_file.empty()) return board;
+  const auto file = std::filesystem::path(path).parent_path() / board.calibration_file;
+  const CalibrationFile calibration = load_calibration(file.string(), board.robot);
+  for (const std::string& line : overrides_of(calibration, board.R_BS)) board.calibration.push_back(line);
+  return board;
+}
 
 Board parse_board(const std::string& text, const std::string& origin) {
   return read_board(Document::parse(text, origin));

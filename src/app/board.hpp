@@ -2,6 +2,7 @@
 // In: path -> out: Board; ConfigError (file:line: key: reason and what is allowed) otherwise. Start-up only.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -21,16 +22,23 @@ struct Board {
   std::vector<BoardLine> led_bars;
   BoardLine button_pause, button_mode;
   bool buttons_active_low = true;
+  double battery_V_per_count = 0.0;
+  double battery_offset_V = 0.0;
   int dc_jack_channel = 0;
   std::string serial_device;
   int serial_baud = 0;
   std::string can_interface;  // empty: no CAN
   int can_bitrate = 0;
-  /// --set overrides: the board's mount rotation and battery scale instead of the configuration's.
+  std::array<double, 9> R_BS{};  // rows
+  std::string calibration_file;  // of equipoise calibrate, beside the board file; empty: none
+  /// --set overrides: the board's mount rotation and battery scale instead of the configuration's, and what
+  /// its calibration file says.
   std::vector<std::string> calibration;
 };
 
 Board load_board(const std::string& path);
+/// Without reading its calibration file, which may still have to be made.
+Board load_wiring(const std::string& path);
 /// From text; `origin` names it in errors.
 Board parse_board(const std::string& text, const std::string& origin);
 

@@ -17,6 +17,9 @@ void add_commands(CLI::App& app, int* status) {
   add_bench(app, status);
   add_campaign(app, status);
   add_guard(app, status);
+  add_doctor(app, status);
+  add_calibrate(app, status);
+  add_bringup(app, status);
 }
 
 }  // namespace equipoise::app

@@ -29,6 +29,9 @@ void add_motor_bench(CLI::App& app, int* status);
 void add_bench(CLI::App& app, int* status);
 void add_campaign(CLI::App& app, int* status);
 void add_guard(CLI::App& app, int* status);
+void add_doctor(CLI::App& app, int* status);
+void add_calibrate(CLI::App& app, int* status);
+void add_bringup(CLI::App& app, int* status);
 
 /// A whole file; InputError names it.
 std::string read_text(const std::string& path);

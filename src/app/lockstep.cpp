@@ -202,7 +202,8 @@ rio_sensors_t counts_of(const lockstep_sensors_t& s, const Calibration& c) noexc
   rio_sensors_t out{};
   const Vec3 gyro_S = c.R_BS.transpose() * (Eigen::Map<const Vec3>(s.gyro_B_rad_s) + c.gyro_bias_B_rad_s);
   const Vec3 force_S =
-      c.R_BS.transpose() * (Eigen::Map<const Vec3>(s.specific_force_B_m_s2) + c.accel_bias_B_m_s2);
+      (c.R_BS.transpose() * (Eigen::Map<const Vec3>(s.specific_force_B_m_s2) + c.accel_bias_B_m_s2))
+          .cwiseQuotient(c.accel_scale_S);
   for (int i = 0; i < 3; ++i) {
     out.gyro_counts[i] = gyro_S(i) / c.gyro_rad_s_per_count;
     out.accel_counts[i] = force_S(i) / c.accel_m_s2_per_count;

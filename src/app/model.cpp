@@ -1,3 +1,6 @@
+#include <functional>
+#include <map>
+
 #include "equipoise/plant/mbbr_dynamics.hpp"
 #include "equipoise/plant/mip_dynamics.hpp"
 #include "rows.hpp"
@@ -42,6 +45,19 @@ nlohmann::json evaluate_mip(const MipDynamics& dynamics, const nlohmann::json& r
           {"accel_B", array_of<3>(dynamics.accelerometer_B(m, qdd))}};
 }
 
+using Model = std::function<nlohmann::json(const nlohmann::json&)>;
+
+/// By the robot's name.
+const std::map<std::string, Model>& models() {
+  static const std::map<std::string, Model> all{
+      {"mbbr", [dynamics = MbbrDynamics{MbbrParameters{}}](
+                   const nlohmann::json& row) { return evaluate_mbbr(dynamics, row); }},
+      {"mip", [dynamics = MipDynamics{MipParameters{}}](const nlohmann::json& row) {
+         return evaluate_mip(dynamics, row);
+       }}};
+  return all;
+}
+
 }  // namespace
 
 void add_model(CLI::App& app, int* status) {
@@ -50,7 +66,7 @@ void add_model(CLI::App& app, int* status) {
   auto robot = std::make_shared<std::string>();
   auto in = std::make_shared<std::string>();
   auto json = std::make_shared<std::string>("-");
-  command->add_option("--robot", *robot, "mbbr or mip")->required()->check(CLI::IsMember({"mbbr", "mip"}));
+  command->add_option("--robot", *robot, "mbbr or mip")->required()->check(CLI::IsMember(models()));
   command
       ->add_option("--in", *in,
                    "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
@@ -58,15 +74,7 @@ void add_model(CLI::App& app, int* status) {
       ->required();
   command->add_option("--json", *json, "output file, - for stdout")->capture_default_str();
   command->callback([=] {
-    if (*robot == "mbbr") {
-      const MbbrDynamics dynamics{MbbrParameters{}};
-      write_json(map_rows(*in, [&](const nlohmann::json& row) { return evaluate_mbbr(dynamics, row); }),
-                 *json);
-    } else {
-      const MipDynamics dynamics{MipParameters{}};
-      write_json(map_rows(*in, [&](const nlohmann::json& row) { return evaluate_mip(dynamics, row); }),
-                 *json);
-    }
+    write_json(map_rows(*in, models().at(*robot)), *json);
     *status = 0;
   });
 }

@@ -10,6 +10,7 @@
 #include "lockstep.hpp"
 #include "reasons.hpp"
 #include "self_test.hpp"
+#include "service_notify.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -93,7 +94,9 @@ class Runner {
     runtime::Telemetry telemetry(options);
     const FlightLimits limits{a_.duration_s, a_.backend != "board"};
     outcome.flight = Firmware::with_pipeline(config_, a_.choice.controller, [&](auto& pipeline) {
+      ServiceNotify service;
       const auto commands = [&](std::int64_t tick, std::int64_t) {
+        service.tick(tick);
         return receiver_ ? receiver_->latest() : script(a_, static_cast<double>(tick) * kTickS);
       };
       return app::fly(io, pipeline, commands, limits, telemetry);

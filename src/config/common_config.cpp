@@ -56,6 +56,7 @@ Calibration read_calibration(Section s, int wheels) {
     s.fail("R_BS", "is not a rotation matrix (rows, sensor axes to body axes)");
   }
   c.gyro_bias_B_rad_s = s.vector<3>("gyro_bias_rad_s", -1.0, 1.0);
+  if (s.has("accel_scale")) c.accel_scale_S = s.vector<3>("accel_scale", 0.8, 1.2);  // logs before it: 1
   c.accel_bias_B_m_s2 = s.vector<3>("accel_bias_m_s2", -2.0, 2.0);
   s.finish();
   return c;

@@ -61,7 +61,8 @@ RawSample SimulatedSensors::sense(const TrueMotion& m) {
     return world_.quantise ? std::clamp(n, -kImuRange - 1.0, kImuRange) : n;
   };
   const Vec3 gyro_S = calibration_.R_BS.transpose() * (gyro + calibration_.gyro_bias_B_rad_s);
-  const Vec3 accel_S = calibration_.R_BS.transpose() * (accel + calibration_.accel_bias_B_m_s2);
+  const Vec3 accel_S = (calibration_.R_BS.transpose() * (accel + calibration_.accel_bias_B_m_s2))
+                           .cwiseQuotient(calibration_.accel_scale_S);
 
   RawSample raw;
   raw.t_ns = static_cast<std::int64_t>(std::llround(m.time_s * 1e9));

@@ -39,6 +39,14 @@ TEST_F(BbbTest, CountsAreTheBoundarysWhateverTheRange) {
   EXPECT_EQ(sample.gyro_counts[0], 100.0);
 }
 
+TEST_F(BbbTest, TellsTheChipsTemperature) {
+  open();
+  imu.setSample({0, 0, 4096}, {0, 0, 0});
+  imu.setRegister(0x41, 0x0D);  // TEMP_OUT: 0x0D0B = 3339 counts, 10.0 K above 21 degC
+  imu.setRegister(0x42, 0x0B);
+  EXPECT_NEAR(tickAndRead().imu_temperature_degC, 31.0, 0.01);
+}
+
 TEST_F(BbbTest, ReturnsByTheDeadlineWhenTheInterruptIsLost) {
   open();
   tickAndRead();

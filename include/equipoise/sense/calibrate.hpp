@@ -17,7 +17,8 @@ struct Calibration {
   std::array<double, kMaxMotors> motor_sign{1, 1, 1, 1};
   Mat3 R_BS = Mat3::Identity();  // sensor axes to body axes
   Vec3 gyro_bias_B_rad_s = Vec3::Zero();
-  Vec3 accel_bias_B_m_s2 = Vec3::Zero();  // of the specific force
+  Vec3 accel_scale_S = Vec3::Ones();      // of each sensor axis, beside accel_m_s2_per_count
+  Vec3 accel_bias_B_m_s2 = Vec3::Zero();  // of the specific force, after the scale
 };
 
 /// Roll, pitch, yaw of R = Rz Ry Rx.
@@ -48,7 +49,8 @@ Measurement<Wheels> calibrate(const RawSample& raw, const Calibration& c) noexce
   const Vec3 gyro_S(raw.gyro_counts[0], raw.gyro_counts[1], raw.gyro_counts[2]);
   const Vec3 accel_S(raw.accel_counts[0], raw.accel_counts[1], raw.accel_counts[2]);
   z.gyro_B_rad_s = c.R_BS * (c.gyro_rad_s_per_count * gyro_S) - c.gyro_bias_B_rad_s;
-  z.accel_B_m_s2 = -(c.R_BS * (c.accel_m_s2_per_count * accel_S) - c.accel_bias_B_m_s2);
+  z.accel_B_m_s2 =
+      -(c.R_BS * (c.accel_m_s2_per_count * c.accel_scale_S.cwiseProduct(accel_S)) - c.accel_bias_B_m_s2);
   const double rad_per_count = 2.0 * kPi / c.encoder_counts_per_rev;
   for (int i = 0; i < Wheels; ++i) {
     const auto k = static_cast<std::size_t>(i);

@@ -1,0 +1,33 @@
+// The service manager's watchdog (systemd, sd_notify protocol): says "ready" at the first tick, then "alive"
+// as long as ticks come. In: tick numbers -> out: datagrams to $NOTIFY_SOCKET from a thread of its own;
+// without the variable, nothing. tick() is RT-safe: one atomic store.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <thread>
+
+namespace equipoise::app {
+
+class ServiceNotify {
+ public:
+  ServiceNotify();
+  ~ServiceNotify();  // says "stopping"
+  ServiceNotify(const ServiceNotify&) = delete;
+  ServiceNotify& operator=(const ServiceNotify&) = delete;
+
+  void tick(std::int64_t tick) noexcept { tick_.store(tick, std::memory_order_relaxed); }
+
+ private:
+  void beat();
+  void send(const std::string& message) const;
+
+  std::string socket_;
+  std::int64_t period_us_;
+  std::atomic<std::int64_t> tick_{-1};
+  std::atomic<bool> done_{false};
+  std::thread thread_;
+};
+
+}  // namespace equipoise::app

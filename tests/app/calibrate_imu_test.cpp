@@ -1,0 +1,117 @@
+// Gyro bias, six-face fit and mount rotation on made-up samples with known answers.
+#include "app/calibrate_imu.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+namespace equipoise::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+template <class F>
+std::string complaint(F&& f) {
+  try {
+    f();
+  } catch (const JobError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+Stillness at_rest(const Vec3& gyro_counts) {
+  Stillness still;
+  still.gyro = gyro_counts;
+  still.gyro_sigma = Vec3::Constant(1.4);
+  return still;
+}
+
+TEST(GyroBias, IsTheMeanInSensorAxes) {
+  const GyroBias bias = gyro_bias(at_rest({16.4, -32.8, 0.0}), Calibration{});
+  EXPECT_NEAR(bias.bias_S_rad_s.x(), kPi / 180.0, 1e-12);  // 16.4 counts are 1 deg/s
+  EXPECT_NEAR(bias.bias_S_rad_s.y(), -2.0 * kPi / 180.0, 1e-12);
+}
+
+TEST(GyroBias, RefusesMotionAndSaysHowMuch) {
+  Stillness shaken = at_rest(Vec3::Zero());
+  shaken.gyro_sigma.y() = 3.0 * 16.4;
+  EXPECT_THAT(complaint([&] { gyro_bias(shaken, Calibration{}); }), HasSubstr("3.00 deg/s of shaking"));
+  Stillness speeding = at_rest(Vec3::Zero());
+  speeding.gyro_drift.z() = -0.5 * 16.4;
+  EXPECT_THAT(complaint([&] { gyro_bias(speeding, Calibration{}); }), HasSubstr("0.50 deg/s of change"));
+  EXPECT_THAT(complaint([&] {
+                gyro_bias(at_rest({0.0, 40.0 * 16.4, 0.0}), Calibration{});
+              }),
+              HasSubstr("40.0 deg/s at rest is no bias"));
+  Stillness rolling = at_rest(Vec3::Zero());
+  rolling.encoder_travel[1] = 12.0;
+  EXPECT_THAT(complaint([&] { gyro_bias(rolling, Calibration{}); }),
+              HasSubstr("wheel 2 turned by 12 counts"));
+}
+
+// A chip that reads (force + bias) / scale per axis.
+const Vec3 kScale(0.97, 1.02, 1.05);
+const Vec3 kBias(0.3, -0.2, 0.5);
+
+Vec3 reads(const Vec3& up) { return (kGravity_m_s2 * up.normalized() + kBias).cwiseQuotient(kScale); }
+
+std::vector<Vec3> six_faces() {
+  // Held by hand: some degrees off the axes.
+  return {reads({1, 0.1, 0}),  reads({-1, 0, 0.1}), reads({0.1, 1, 0}),
+          reads({0, -1, 0.1}), reads({0, 0.1, 1}),  reads({0.1, 0, -1})};
+}
+
+TEST(SixFaces, FindsScaleAndBiasOfACrookedlyHeldChip) {
+  const AccelFit fit = fit_six_faces(six_faces(), reads({1, 1, 1}));
+  EXPECT_LT((fit.scale_S - kScale).norm(), 1e-9);
+  EXPECT_LT((fit.bias_S_m_s2 - kBias).norm(), 1e-8);
+  EXPECT_LT(fit.check_error_m_s2, 1e-8);
+}
+
+TEST(SixFaces, ScoresAPoseThatItDidNotFit) {
+  const AccelFit fit = fit_six_faces(six_faces(), reads({1, 1, 1}) * 1.01);
+  EXPECT_NEAR(fit.check_error_m_s2, 0.01 * kGravity_m_s2, 0.01);
+}
+
+TEST(SixFaces, RefusesMissingFacesByName) {
+  std::vector<Vec3> faces = six_faces();
+  faces[1] = faces[0];
+  faces.pop_back();
+  EXPECT_THAT(complaint([&] { fit_six_faces(faces, faces[0]); }), HasSubstr("never up: -x, -z"));
+}
+
+TEST(SixFaces, RefusesWhatNoChipDoes) {
+  std::vector<Vec3> faces = six_faces();
+  faces[0] *= 1.4;
+  EXPECT_THAT(complaint([&] { fit_six_faces(faces, faces[1]); }), HasSubstr("implausible fit"));
+}
+
+TEST(FaceUp, NeedsAnAxisWithin25Degrees) {
+  EXPECT_EQ(face_up({0, 0, 9.8}), 2);
+  EXPECT_EQ(face_up({0, -9.8, 3.0}), 4);
+  EXPECT_EQ(face_up({7, 0, 7}), -1);
+}
+
+TEST(MountRotation, ComesFromGravityAtTwoPoses) {
+  const Mat3 R_BS =
+      (Eigen::AngleAxisd(0.4, Vec3::UnitX()) * Eigen::AngleAxisd(-1.9, Vec3(1, 2, 3).normalized()))
+          .toRotationMatrix();
+  for (const Vec3& axis : {Vec3(Vec3::UnitX()), Vec3(Vec3::UnitY())}) {
+    const Mat3 tipped = Eigen::AngleAxisd(0.6, axis).toRotationMatrix();  // body to world
+    const Vec3 up_B = kGravity_m_s2 * Vec3::UnitZ();
+    const Vec3 tipped_B = tipped.transpose() * up_B;
+    const Mat3 found = mount_rotation(R_BS.transpose() * up_B, R_BS.transpose() * tipped_B, axis);
+    EXPECT_LT((found - R_BS).norm(), 1e-12) << "tipped about " << axis.transpose();
+  }
+}
+
+TEST(MountRotation, RefusesTooLittleTiltAndNoGravity) {
+  const Vec3 up(0, 0, kGravity_m_s2);
+  EXPECT_THAT(complaint([&] { mount_rotation(up, {0.9, 0, 9.75}, Vec3::UnitY()); }), HasSubstr("5 degrees"));
+  EXPECT_THAT(complaint([&] { mount_rotation(1.5 * up, up, Vec3::UnitY()); }), HasSubstr("14.7 m/s2"));
+}
+
+}  // namespace
+}  // namespace equipoise::app

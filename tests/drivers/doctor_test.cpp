@@ -1,0 +1,78 @@
+// The doctor's look at a robot's devices, on umockdev's bus: which chip answers, and how it fails.
+#include "app/doctor.hpp"
+
+#include <cerrno>
+
+#include "testbed.hpp"
+
+namespace equipoise::app::doctor {
+namespace {
+
+class DoctorTest : public Testbed {
+ protected:
+  void SetUp() override {
+    addBoard();
+    board_ = load_board(std::string(EQUIPOISE_SOURCE_DIR) + "/config/boards/robotics_cape_mbbr.toml");
+    patient_.board = &board_;
+  }
+
+  Finding look(const std::string& name) {
+    Findings findings;
+    examine_buses(patient_, &findings);
+    for (const Finding& finding : findings.all()) {
+      if (finding.name == name) return finding;
+    }
+    return {name, Verdict::kSkipped, "not looked at", ""};
+  }
+
+  Board board_;
+  Patient patient_;
+};
+
+TEST_F(DoctorTest, KnowsTheChipThatAnswers) {
+  EXPECT_EQ(look("imu.chip").verdict, Verdict::kOk);
+  EXPECT_NE(look("imu.chip").what.find("is an MPU-9250 (0x71)"), std::string::npos);
+  imu.setWhoAmI(0x73);
+  EXPECT_EQ(look("imu.chip").verdict, Verdict::kWarn);
+  EXPECT_NE(look("imu.chip").what.find("MPU-9255"), std::string::npos);
+  imu.setWhoAmI(0x68);
+  EXPECT_EQ(look("imu.chip").verdict, Verdict::kFail);
+  EXPECT_NE(look("imu.chip").what.find("answers as 0x68"), std::string::npos);
+}
+
+TEST_F(DoctorTest, TellsASilentChipFromABusyOneAndFromABusOfAnotherKind) {
+  imu.failNext(EREMOTEIO);
+  Finding silent = look("imu.chip");
+  EXPECT_EQ(silent.verdict, Verdict::kFail);
+  EXPECT_NE(silent.what.find("nothing answers"), std::string::npos);
+  EXPECT_EQ(silent.fix, "i2cdetect -y -r 2");
+  imu.failNext(EBUSY);
+  EXPECT_NE(look("imu.chip").what.find("held by a kernel driver"), std::string::npos);
+  plain_i2c = false;
+  EXPECT_EQ(look("imu.bus").verdict, Verdict::kFail);
+  EXPECT_EQ(look("imu.chip").what, "not looked at");
+}
+
+TEST_F(DoctorTest, LooksWithoutChangingTheChip) {
+  look("imu.chip");
+  EXPECT_TRUE(imu.writes().empty());
+}
+
+TEST_F(DoctorTest, FindsEveryDeviceOfTheBoard) {
+  Findings findings;
+  examine_buses(patient_, &findings);
+  for (const Finding& finding : findings.all()) {
+    EXPECT_NE(finding.verdict, Verdict::kFail) << finding.name << ": " << finding.what;
+  }
+}
+
+TEST_F(DoctorTest, RefusesADmpImageOfTheWrongSize) {
+  const std::string path = writeFile("dmp.bin", "too short");
+  path.copy(board_.wiring.imu.dmp_firmware, sizeof board_.wiring.imu.dmp_firmware - 1);
+  const Finding finding = look("imu.dmp");
+  EXPECT_EQ(finding.verdict, Verdict::kFail);
+  EXPECT_NE(finding.what.find("9 bytes, not 3062"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace equipoise::app::doctor

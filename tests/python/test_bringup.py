@@ -1,0 +1,107 @@
+"""calibrate and bringup from the command line, on the practice robot (--backend stand)."""
+
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+BOARDS = {"mbbr": "robotics_cape_mbbr", "edumip": "robotics_cape_edumip"}
+
+
+def equipoise(root, *arguments, **popen):
+    command = [root / "build/host/equipoise", *arguments]
+    return subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, timeout=60, stdin=subprocess.DEVNULL, **popen
+    )
+
+
+def on_stand(root, command, *arguments, robot="mbbr"):
+    board = root / f"config/boards/{BOARDS[robot]}.toml"
+    bench = ["--config", root / f"config/{robot}.toml", "--board", board, "--backend", "stand"]
+    return equipoise(root, *command.split(), *bench, "--json", "-", *arguments)
+
+
+def values(path: Path, key: str) -> list[float]:
+    return json.loads(re.search(rf"^{key} = (\[.*\])$", path.read_text(), re.M)[1])
+
+
+@pytest.mark.parametrize("robot", BOARDS)
+def test_every_calibration_adds_its_part_to_one_file(root, tmp_path, robot):
+    out = tmp_path / "calibration.toml"
+    for what in ("gyro", "accel", "mount", "motors", "encoders"):
+        ended = on_stand(root, f"calibrate {what}", "--out", out, robot=robot)
+        assert ended.returncode == 0, ended.stderr
+        assert json.loads(ended.stdout)["what"] == what
+    assert re.findall(r"^\[(\w+)\]$", out.read_text(), re.M) == [
+        *("gyro", "accel", "mount", "motors", "encoders")
+    ]
+    # The practice chip's axes read 1 % long, 1.5 % short and 2 % long.
+    assert values(out, "scale") == pytest.approx([1 / 1.01, 1 / 0.985, 1 / 1.02], abs=0.005)
+
+
+def test_motion_is_refused_with_its_size_and_nothing_is_written(root, tmp_path):
+    out = tmp_path / "calibration.toml"
+    ended = on_stand(root, "calibrate gyro", "--out", out, "--practice-fault", "moving")
+    assert ended.returncode == 1
+    assert re.search(r"30\.\d deg/s at rest is no bias", ended.stderr) and ended.stderr.count("\n") == 1
+    assert not out.exists()
+
+
+def test_a_wiring_fault_fails_the_calibration_and_names_the_cure(root, tmp_path):
+    ended = on_stand(
+        root, "calibrate motors", "--out", tmp_path / "c.toml", "--practice-fault", "motor-2-reversed"
+    )
+    assert ended.returncode == 1
+    assert json.loads(ended.stdout)["complaint"].startswith("motor 2 turns backwards")
+    assert "equipoise bringup" in ended.stderr
+
+
+def test_bringup_writes_a_board_file_that_fits_and_run_reads_its_calibration(root, tmp_path):
+    board = tmp_path / "robot.toml"
+    faults = ["--practice-fault", "motors-1-3-swapped", "encoder-2-reversed"]
+    ended = on_stand(root, "bringup", "--out", board, *faults)
+    assert ended.returncode == 0, ended.stderr
+    assert "motor 1 turns wheel 3" in json.loads(ended.stdout)["corrected"]
+    calibration = tmp_path / "robot-calibration.toml"
+    assert values(calibration, "bias_rad_s")
+    # Whoever reads the board file reads the calibration beside it, strictly.
+    assert equipoise(root, "doctor", "--board", board, "--root", tmp_path).returncode == 1  # no robot here
+    calibration.write_text(calibration.read_text().replace("version = 1", "version = 9"))
+    ended = equipoise(root, "doctor", "--board", board)
+    assert ended.returncode == 2 and "robot-calibration.toml" in ended.stderr and "version" in ended.stderr
+    # Nothing is overwritten unasked.
+    ended = on_stand(root, "bringup", "--out", board)
+    assert ended.returncode == 2 and "--force" in ended.stderr
+
+
+def test_a_dead_motor_stops_bringup_without_a_board_file(root, tmp_path):
+    ended = on_stand(root, "bringup", "--out", tmp_path / "b.toml", "--practice-fault", "motor-3-dead")
+    assert ended.returncode == 1 and "motor 3: no encoder moves" in ended.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_board_the_real_robot_is_refused_clearly(root, tmp_path):
+    bench = ["--config", root / "config/mbbr.toml", "--board", root / "config/boards/robotics_cape_mbbr.toml"]
+    ended = equipoise(root, "calibrate", "gyro", *bench, "--out", tmp_path / "c.toml")
+    assert ended.returncode == 1 and "equipoise doctor" in ended.stderr and ended.stderr.count("\n") == 1
+    ended = equipoise(root, "bringup", *bench, "--out", tmp_path / "b.toml")
+    assert ended.returncode == 1 and "doctor: device_tree.model" in ended.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments, named",
+    [
+        (["calibrate", "magnet"], "magnet"),
+        (["calibrate", "gyro", "--practice-fault", "gremlin"], "gremlin"),
+        (["calibrate", "gyro", "--config", "config/edumip.toml"], "board.robot"),
+    ],
+)
+def test_bad_usage_is_one_clear_error(root, tmp_path, arguments, named):
+    bench = ["--board", "config/boards/robotics_cape_mbbr.toml", "--backend", "stand"]
+    if "--config" not in arguments:
+        bench += ["--config", "config/mbbr.toml"]
+    ended = equipoise(root, *arguments, *bench, "--out", tmp_path / "c.toml", cwd=root)
+    assert ended.returncode == 2 and named in ended.stderr
+    assert not (tmp_path / "c.toml").exists()

@@ -1,0 +1,230 @@
+"""equipoise doctor on a made-up /sys, /proc and /dev: what it finds, and what it says to do."""
+
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+GPIO = {"44e07000": 0, "4804c000": 1, "481ac000": 2, "481ae000": 3}
+# Pads of the MBBR's pins, and what they must be switched to: AM335x data sheet, BeagleBone Black headers.
+PADS = {
+    0x978: 0x33,
+    0x97C: 0x33,
+    0x980: 0x30,
+    0x984: 0x10,  # I2C2, UART1
+    0x848: 0x06,
+    0x84C: 0x06,
+    0x820: 0x04,  # EHRPWM1A, 1B, 2A
+    0x9A0: 0x31,
+    0x9A4: 0x31,
+    0x8D0: 0x32,
+    0x8D4: 0x32,
+    0x830: 0x34,
+    0x834: 0x34,  # eQEP0, 1, 2
+    **dict.fromkeys((0x9B4, 0x878, 0x874, 0x840, 0x8CC, 0x8AC, 0x8A8), 0x07),  # enable, in1, in2
+    **dict.fromkeys((0x890, 0x894, 0x82C, 0x88C, 0x87C, 0x828), 0x07),  # LEDs
+    **dict.fromkeys((0x9AC, 0x844, 0x99C, 0x998, 0x89C, 0x898), 0x37),  # interrupt, faults, buttons
+}
+
+
+def write(path: Path, text: str = "") -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+def device(root: Path, bus: str, path: str, attributes: dict[str, str]) -> None:
+    """A device and its link in /sys/BUS."""
+    place = root / "sys/devices/platform/ocp" / path
+    for name, value in attributes.items():
+        write(place / name, value)
+    link = root / "sys" / bus / place.name
+    link.parent.mkdir(parents=True, exist_ok=True)
+    link.symlink_to(os.path.relpath(place, link.parent))
+
+
+def pads(root: Path, values: dict[int, int]) -> None:
+    lines = [
+        f"pin {(at - 0x800) // 4} (PIN{at}) 0:? {0x44E10000 + at:08x} {value:08x} pinctrl-single \n"
+        for at, value in values.items()
+    ]
+    write(
+        root / "sys/kernel/debug/pinctrl/44e10800.pinmux-pinctrl-single/pins", "registered\n" + "".join(lines)
+    )
+
+
+@pytest.fixture
+def robot(tmp_path) -> Path:
+    """Everything but the IMU, which answers only to ioctls: see tests/drivers/doctor_test.cpp."""
+    root = tmp_path / "robot"
+    write(root / "proc/version", "Linux version 6.1.46-bone-rt-r14 #1 PREEMPT_RT\n")
+    write(root / "sys/kernel/realtime", "1\n")
+    write(root / "proc/device-tree/model", "TI AM335x BeagleBone Black\0")
+    write(root / "proc/device-tree/chosen/overlays/equipoise-cape.kernel")
+    write(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", "dmtimer\n")
+    limits = "Max realtime priority     {0}                   {0}\n"
+    write(
+        root / "proc/self/limits",
+        limits.format(99) + "Max locked memory         unlimited  unlimited  bytes\n",
+    )
+    write(root / "proc/self/status", "CapEff:\t0000000000000000\n")
+    write(
+        root / "proc/net/route",
+        "Iface Destination Gateway Flags RefCnt Use Metric Mask MTU Window IRTT\n"
+        "lo 000000E0 00000000 0001 0 0 0 000000F0 0 0 0\n",
+    )
+    for address, number in (("48302200", 4), ("48304200", 7)):
+        device(root, "class/pwm", f"{address}.pwm/pwm/pwmchip{number}", {"npwm": "2\n", "export": ""})
+    for number, address in enumerate(("48300180", "48302180", "48304180")):
+        device(root, "bus/counter/devices", f"{address}.counter/counter{number}", {"count0/enable": "0\n"})
+    adc = {"name": "TI-am335x-adc.0.auto\n", "in_voltage6_raw": "1655\n"}
+    device(root, "bus/iio/devices", "44e0d000.adc/iio:device0", adc)
+    for address, number in GPIO.items():
+        device(root, "bus/gpio/devices", f"{address}.gpio/gpiochip{number}", {"label": address})
+        write(root / f"dev/gpiochip{number}")
+    for name in ("cpu_dma_latency", "ttyS1"):
+        write(root / "dev" / name)
+    pads(root, PADS)
+    return root
+
+
+def examine(root: Path, robot: Path, *arguments, board="robotics_cape_mbbr"):
+    command = [root / "build/host/equipoise", "doctor", "--json", "-", "--root", robot]
+    if board:
+        command += ["--board", board if isinstance(board, Path) else root / f"config/boards/{board}.toml"]
+    ended = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=30)
+    result = json.loads(ended.stdout)
+    assert ended.returncode == (0 if result["ok"] else 1)
+    return {check["name"]: check for check in result["checks"]}, ended.stderr
+
+
+def failing(checks) -> dict:
+    return {name: check for name, check in checks.items() if check["verdict"] == "fail"}
+
+
+def test_a_robot_whose_imu_is_missing_fails_in_that_alone(root, robot):
+    checks, text = examine(root, robot)
+    assert list(failing(checks)) == ["imu.bus"]
+    assert "/dev/i2c-2" in checks["imu.bus"]["what"] and "modprobe i2c-dev" in checks["imu.bus"]["fix"]
+    assert checks["battery.adc"]["what"].startswith("7.90 V")  # 1655 * 1.8 / 4095 * 11 - 0.10
+    assert checks["lcm.route"]["what"].endswith("through lo")
+    assert checks["can"]["verdict"] == "skipped"
+    assert len([name for name in checks if name.startswith("pinmux.")]) == len(PADS)
+    assert "1 failures" in text
+
+
+BREAKS = {  # what breaks it: (check, verdict, in what is wrong, in the fix)
+    "sys/kernel/realtime": ("kernel.preempt_rt", "warn", "not PREEMPT_RT", "bone-rt"),
+    "sys/class/pwm/pwmchip7": ("pwm.3", "fail", "no EHRPWM at 48304200", "uboot_overlay_addr4"),
+    "sys/bus/counter/devices/counter1": ("encoder.2", "fail", "no eQEP at 48302180", "uboot_overlay_addr4"),
+    "sys/bus/iio/devices/iio:device0": ("battery.adc", "fail", "no ADC", "uboot_overlay_addr4"),
+    "sys/bus/gpio/devices/gpiochip3": ("gpio.481ae000.21", "fail", "[imu] interrupt", "gpiodetect"),
+    "dev/ttyS1": ("serial", "warn", "No such file", "reboot"),
+    "proc/net/route": ("lcm.route", "warn", "no route to 239.255.76.67", "ip route add 224.0.0.0/4 dev lo"),
+    "dev/cpu_dma_latency": ("limits.cpu_idle", "warn", "deep idle", "adduser"),
+    "proc/device-tree/chosen/overlays/equipoise-cape.kernel": (
+        *("device_tree.overlay", "warn"),
+        *("not loaded", "uboot_overlay_addr4"),
+    ),
+}
+
+
+@pytest.mark.parametrize("broken", BREAKS)
+def test_what_is_missing_is_named_with_its_fix(root, robot, broken):
+    (robot / broken).unlink()
+    if broken == "sys/kernel/realtime":
+        write(robot / "proc/version", "Linux version 6.1.46-bone SMP PREEMPT\n")
+    name, verdict, what, fix = BREAKS[broken]
+    checks, _ = examine(root, robot)
+    assert checks[name]["verdict"] == verdict
+    assert what in checks[name]["what"] and fix in checks[name]["fix"]
+
+
+def test_limits_of_an_ordinary_user_fail_on_a_robot_and_warn_elsewhere(root, robot):
+    write(robot / "proc/self/limits", "Max realtime priority 0 0\nMax locked memory 65536 65536 bytes\n")
+    checks, _ = examine(root, robot)
+    assert {"limits.rtprio", "limits.memlock"} <= set(failing(checks))
+    assert "@equipoise - rtprio 99" in checks["limits.rtprio"]["fix"]
+    checks, _ = examine(root, robot, board=None)
+    assert checks["limits.rtprio"]["verdict"] == checks["limits.memlock"]["verdict"] == "warn"
+    write(robot / "proc/self/status", "CapEff:\t0000000000804000\n")  # CAP_SYS_NICE, CAP_IPC_LOCK
+    checks, _ = examine(root, robot)
+    assert checks["limits.rtprio"]["verdict"] == checks["limits.memlock"]["verdict"] == "ok"
+
+
+@pytest.mark.parametrize(
+    "pad, value, pin, what",
+    [
+        (0x848, 0x07, "P9.14", "motor 1 pwm: pad is in mode 7, needs mode 6"),
+        (0x8D4, 0x12, "P8.33", "motor 2 encoder: the pad's receiver is off"),
+        (0x9AC, 0x31, "P9.25", "[imu] interrupt: pad is in mode 1, needs mode 7"),
+    ],
+)
+def test_a_pin_that_is_switched_to_another_function_is_named(root, robot, pad, value, pin, what):
+    pads(robot, {**PADS, pad: value})
+    checks, _ = examine(root, robot)
+    assert sorted(failing(checks)) == ["imu.bus", f"pinmux.{pin}"]
+    assert what in checks[f"pinmux.{pin}"]["what"]
+
+
+def test_without_debugfs_the_pins_are_not_guessed(root, robot):
+    pads(robot, {})
+    checks, _ = examine(root, robot)
+    assert checks["pinmux"]["verdict"] == "skipped" and "sudo" in checks["pinmux"]["fix"]
+
+
+def with_can(root, tmp_path, device) -> Path:
+    text = (root / "config/boards/robotics_cape_mbbr.toml").read_text()
+    text = re.sub(r'interface = ""', 'interface = "can1"', text).replace("/dev/ttyS1", device)
+    write(tmp_path / "can.toml", text)
+    return tmp_path / "can.toml"
+
+
+def test_can_needs_its_overlay_its_pins_and_a_bit_rate(root, robot, tmp_path):
+    checks, _ = examine(root, robot, board=with_can(root, tmp_path, "/dev/ttyS1"))
+    assert "share P9.24" in checks["can"]["what"] and "ttyS5" in checks["can"]["fix"]
+    board = with_can(root, tmp_path, "/dev/ttyS5")
+    checks, _ = examine(root, robot, board=board)
+    assert checks["can"]["verdict"] == "fail" and "equipoise-can.dtbo" in checks["can"]["fix"]
+    write(robot / "sys/class/net/can1/operstate", "down\n")
+    checks, _ = examine(root, robot, board=board)
+    assert checks["can"]["fix"] == "sudo ip link set can1 up type can bitrate 500000 restart-ms 100"
+    write(robot / "sys/class/net/can1/operstate", "up\n")
+    checks, _ = examine(root, robot, board=board)
+    assert checks["can"]["verdict"] == "ok"
+
+
+def test_a_key_that_others_can_read_fails(root, robot, tmp_path):
+    key = tmp_path / "key"
+    subprocess.run([root / "build/host/equipoise", "keygen", key], check=True, capture_output=True)
+    checks, _ = examine(root, robot, "--command-key", key)
+    assert checks["command.key"]["verdict"] == "ok"
+    key.chmod(0o640)
+    checks, _ = examine(root, robot, "--command-key", key)
+    assert checks["command.key"]["verdict"] == "fail" and checks["command.key"]["fix"] == f"chmod 600 {key}"
+
+
+def test_a_laptop_gets_an_answer_not_a_crash(root, tmp_path):
+    """An empty machine: nothing is there, nothing but the robot is missing."""
+    checks, _ = examine(root, tmp_path, board=None)
+    assert not failing(checks)
+    assert checks["device_tree.model"]["what"] == "no device tree: a machine for simulation, not a robot"
+    checks, _ = examine(root, tmp_path)
+    assert checks["device_tree.model"]["verdict"] == "fail"
+    assert checks["board"]["verdict"] == "skipped"
+
+
+def test_every_finding_that_is_not_fine_says_what_to_do(root, tmp_path, robot):
+    for place in (tmp_path, robot):
+        for check in examine(root, place)[0].values():
+            if check["verdict"] in ("warn", "fail"):
+                assert check["fix"], check
+
+
+def test_bad_usage_is_one_clear_line(root, tmp_path):
+    command = [root / "build/host/equipoise", "doctor"]
+    for arguments in (["--root", tmp_path / "none"], ["--board", tmp_path / "none.toml"]):
+        ended = subprocess.run([*command, *arguments], capture_output=True, text=True)
+        assert ended.returncode == 2 and ended.stderr.count("\n") == 1 and "none" in ended.stderr

@@ -1,0 +1,126 @@
+"""What the Debian package holds; and that the service manager hears the firmware."""
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+
+import pytest
+from equipoise_tools.lockstep_client import Robot
+from test_doctor import PADS
+from test_lockstep import Firmware, step
+
+
+def overlay_pads(root, name: str) -> dict[int, tuple[int, int]]:
+    """Pad -> (configuration, mode) of an overlay's source."""
+    text = (root / f"packaging/equipoise-{name}.dts").read_text()
+    rows = re.findall(r"^\t+(0x\w+) (0x\w+) (\d)  /\*", text, re.M)
+    return {0x800 + int(at, 16): (int(configuration, 16), int(mode)) for at, configuration, mode in rows}
+
+
+@pytest.mark.parametrize("name", ["cape", "can"])
+def test_overlays_compile_without_a_warning(root, tmp_path, name):
+    if not shutil.which("dtc"):
+        pytest.skip("device-tree-compiler is not installed")
+    source = root / f"packaging/equipoise-{name}.dts"
+    command = ["dtc", "-@", "-I", "dts", "-O", "dtb", "-o", tmp_path / "o.dtbo", source]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0 and ended.stderr == ""
+    assert (tmp_path / "o.dtbo").stat().st_size > 500
+
+
+def test_the_overlay_switches_every_pad_as_the_doctor_expects(root):
+    pads = overlay_pads(root, "cape")
+    for pad, value in PADS.items():
+        configuration, mode = pads[pad]
+        assert mode == value & 7, hex(pad)
+        assert configuration & 0x20 == value & 0x20, f"receiver of {pad:#x}"
+    assert pads[0x9B4] == (0x00, 7)  # bridge enable: pulled down while nobody drives it
+    text = (root / "packaging/equipoise-cape.dts").read_text()
+    for device in ("eqep0", "eqep1", "eqep2", "ehrpwm1", "ehrpwm2", "tscadc", "uart1", "i2c2"):
+        assert re.search(rf'^&{device} {{\n\tstatus = "okay";', text, re.M), device
+
+
+def test_can_takes_the_pads_of_uart1(root):
+    assert overlay_pads(root, "can") == {
+        0x980: (0x10, 2),
+        0x984: (0x30, 2),
+        0x8C0: (0x10, 4),
+        0x8C4: (0x30, 4),
+    }
+    text = (root / "packaging/equipoise-can.dts").read_text()
+    assert '&uart1 {\n\tstatus = "disabled"' in text and '&dcan1 {\n\tstatus = "okay"' in text
+
+
+def test_the_service_is_understood_and_gives_what_the_doctor_asks_for(root, tmp_path):
+    unit = (root / "packaging/equipoise.service").read_text()
+    for line in ("Type=notify", "WatchdogSec=2", "LimitRTPRIO=99", "LimitMEMLOCK=infinity", "Restart=no"):
+        assert f"\n{line}\n" in unit
+    after = re.search(r"^ExecStopPost=/bin/sh -c '(.*)'$", unit, re.M)[1].replace("$$", "$")
+    for channel in ("pwm0", "pwm-7:1"):
+        (tmp_path / "pwmchip7" / channel).mkdir(parents=True)
+        (tmp_path / "pwmchip7" / channel / "enable").write_text("1")
+    subprocess.run(["/bin/sh", "-c", after.replace("/sys/class/pwm", str(tmp_path))], check=True)
+    assert [f.read_text() for f in tmp_path.glob("pwmchip7/*/enable")] == ["0\n", "0\n"]
+    options = re.findall(r" (--[a-z-]+)", re.search(r"^ExecStart=.*$", unit, re.M)[0])
+    help_text = subprocess.run(
+        [root / "build/host/equipoise", "run", "--help"], capture_output=True, text=True
+    ).stdout
+    assert options and all(option in help_text for option in options)
+    if not shutil.which("systemd-analyze"):
+        pytest.skip("systemd is not installed")
+    # As installed, but with a program and a manual page that exist here.
+    text = unit.replace("/usr/bin/equipoise", "/bin/true").replace("Documentation=man:equipoise(1)\n", "")
+    (tmp_path / "equipoise.service").write_text(text)
+    command = ["systemd-analyze", "verify", "--man=no", tmp_path / "equipoise.service"]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert "equipoise.service" not in ended.stderr, ended.stderr
+
+
+def test_run_tells_the_service_manager_that_it_is_ready_and_alive(root, tmp_path):
+    manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    manager.bind(str(tmp_path / "notify"))
+    manager.settimeout(20)
+    environment = {**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "200000"}
+    firmware = Firmware(root, tmp_path, "--timeout-s", "20", env=environment)
+    with firmware.connect() as connection:
+        manager.setblocking(False)
+        with pytest.raises(BlockingIOError):  # not before the first tick
+            manager.recv(100)
+        manager.settimeout(20)
+        robot = Robot(0.01)
+        step(connection, robot, 0)
+        assert manager.recv(100) == b"READY=1\nWATCHDOG=1"
+        step(connection, robot, 1)
+        assert manager.recv(100) == b"WATCHDOG=1"
+        manager.settimeout(0.5)  # ten beats' time: a loop that hangs is silent
+        with pytest.raises(TimeoutError):
+            manager.recv(100)
+    firmware.process.terminate()
+    firmware.end()
+    manager.settimeout(20)
+    assert manager.recv(100) == b"STOPPING=1"
+
+
+@pytest.mark.slow
+def test_the_package_is_whole_and_clean(root, tmp_path):
+    ended = subprocess.run(
+        [root / "tools/package", "--output", tmp_path], capture_output=True, text=True, timeout=1200
+    )
+    assert ended.returncode == 0, ended.stderr  # lintian among it
+    package = ended.stdout.strip()
+    fields = subprocess.run(["dpkg-deb", "--field", package], capture_output=True, text=True).stdout
+    depends = re.search(r"^Depends: (.*)$", fields, re.M)[1]
+    assert all(library in depends for library in ("libc6 (>=", "liblcm1", "libsodium23", "libgpiod2"))
+    subprocess.run(["dpkg-deb", "--extract", package, tmp_path / "tree"], check=True)
+    for place in (
+        "usr/bin/equipoise",
+        "etc/equipoise/boards/robotics_cape_mbbr.toml",
+        "lib/systemd/system/equipoise.service",
+        "lib/udev/rules.d/90-equipoise.rules",
+        "lib/firmware/equipoise-cape.dtbo",
+    ):
+        assert (tmp_path / "tree" / place).stat().st_size > 0
+    ended = subprocess.run([tmp_path / "tree/usr/bin/equipoise", "--version"], capture_output=True, text=True)
+    assert ended.stdout.strip() in package
