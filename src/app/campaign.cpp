@@ -25,6 +25,7 @@ struct Soak {
   std::int64_t disarmed = 0;
   std::int64_t unexplained = 0;
   std::int64_t unsafe = 0;
+  nlohmann::json to_explain = nlohmann::json::array();  // flights that are unsafe or fell without a fault
 };
 
 std::string names_of(std::uint32_t reasons) {
@@ -69,12 +70,23 @@ Soak soak(const typename Firmware::Config& config, double hours, std::uint64_t s
     plan.fault_at_tick = pick(300, 3000);
     plan.fault_ticks = pick(1, 200);
     plan.end_tick = plan.fault_at_tick + pick(200, 2000);
-    const Verdict v = one<Firmware>(config, plan, engine());
+    const std::uint64_t flight_seed = engine();
+    const Verdict v = one<Firmware>(config, plan, flight_seed);
     ticks += plan.end_tick;
     ++s.flights;
     s.disarmed += v.disarmed ? 1 : 0;
     s.unsafe += v.unsafe ? 1 : 0;
     s.unexplained += v.fell_without_fault ? 1 : 0;
+    if (v.unsafe || v.fell_without_fault) {
+      s.to_explain.push_back({{"phase", kPhaseNames[static_cast<std::size_t>(plan.phase)]},
+                              {"fault", kFaults[static_cast<std::size_t>(plan.fault)].name},
+                              {"fault_at_tick", plan.fault_at_tick},
+                              {"fault_ticks", plan.fault_ticks},
+                              {"seed", flight_seed},
+                              {"off_after_ticks", v.off_after_ticks},
+                              {"reasons", names_of(v.reasons)},
+                              {"why", v.why}});
+    }
   }
   s.hours = static_cast<double>(ticks) / kTickHz / 3600.0;
   return s;
@@ -129,11 +141,8 @@ int campaign(const Arguments& a) {
       std::to_string(cases.size()) + " fault x phase cases, " + std::to_string(unsafe) + " unsafe";
   if (a.soak_h > 0.0) {
     const Soak s = soak<Firmware>(config, a.soak_h, a.seed);
-    out["soak"] = {{"hours", s.hours},
-                   {"flights", s.flights},
-                   {"disarmed", s.disarmed},
-                   {"unsafe", s.unsafe},
-                   {"unexplained", s.unexplained}};
+    out["soak"] = {{"hours", s.hours},   {"flights", s.flights},         {"disarmed", s.disarmed},
+                   {"unsafe", s.unsafe}, {"unexplained", s.unexplained}, {"to_explain", s.to_explain}};
     char line[200];
     std::snprintf(line, sizeof line,
                   "; soak %.2f h of robot time, %lld flights, %lld disarmed by a fault, %lld unsafe, "

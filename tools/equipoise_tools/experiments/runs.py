@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from .. import metrics, names
 from ..log import Log, read_log
 from ..paths import UserError, repository_root
 
@@ -46,3 +47,12 @@ def simulate(
         log = Path(folder) / "run.lcm"
         summary = json.loads(equipoise(*arguments, "--log", log, fails=True))
         return summary, read_log(log)
+
+
+def over_estimate(log: Log, channel: str) -> float:
+    """Slope of the estimated ball rate on the true one, both axes, after the run has settled."""
+    estimate, truth = metrics.aligned(log, channel, names.TRUTH)
+    settled = (estimate["utime"] - log.start_utime) * 1e-6 >= metrics.SETTLE_S
+    x = metrics.rolling_rates(truth, 2)[settled].ravel()
+    y = metrics.rolling_rates(estimate, 2)[settled].ravel()
+    return float(x @ y / (x @ x))
