@@ -31,6 +31,16 @@ std::size_t fidelity_level(const std::string& name) {
   return static_cast<std::size_t>(level - kFidelityNames.begin());
 }
 
+namespace {
+
+/// An engine's IMU may be noiseless and stand still, and its robot is not the one the filters were tuned on.
+void allow_another_robot(SafetyParams* safety) {
+  safety->max_identical_samples = 0;
+  safety->max_innovation = std::max(safety->max_innovation, safety->max_innovation_published);
+}
+
+}  // namespace
+
 MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choice) {
   MbbrConfig config = configured;
   for (std::size_t i = 0; i < kMbbrEstimatorNames.size(); ++i) {
@@ -42,8 +52,7 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   config.safety.needs_attitude = config.estimators.active == MbbrEstimatorId::kKfAttitude;
   if (config.estimators.active == MbbrEstimatorId::kEkf13Published)
     config.safety.max_innovation = config.safety.max_innovation_published;
-  if (choice.backend == "lockstep")
-    config.safety.max_identical_samples = 0;  // an engine's IMU may stand still
+  if (choice.backend == "lockstep") allow_another_robot(&config.safety);
   // In simulation the firmware is configured for the robot it is on: the level's bridge, and no compensation
   // of absent friction.
   if (!choice.fidelity.empty()) {
@@ -65,7 +74,7 @@ MipConfig MipFirmware::apply(const MipConfig& configured, const Choice& choice) 
   config.safety.needs_attitude = config.estimators.active == MipEstimatorId::kAttitude;
   if (config.estimators.active == MipEstimatorId::kEkfPublished)
     config.safety.max_innovation = config.safety.max_innovation_published;
-  if (choice.backend == "lockstep") config.safety.max_identical_samples = 0;
+  if (choice.backend == "lockstep") allow_another_robot(&config.safety);
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];

@@ -23,7 +23,7 @@ class Bridges {
 };
 
 /// The board, through the C drivers.
-class BoardBridges : public Bridges {
+class BoardBridges final : public Bridges {
  public:
   explicit BoardBridges(const bbb_config_t& config);  // throws std::runtime_error naming the device
   ~BoardBridges() override { cutoff_close(&cutoff_); }
@@ -37,7 +37,7 @@ class BoardBridges : public Bridges {
 };
 
 /// Kept descriptors of sysfs attributes: one write each.
-class FileBridges : public Bridges {
+class FileBridges final : public Bridges {
  public:
   FileBridges(const std::string& enable, const std::vector<std::string>& pwm);
   ~FileBridges() override;
