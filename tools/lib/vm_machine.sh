@@ -29,6 +29,31 @@ image_of() {
   printf '%s\n' "$image"
 }
 
+# prepare_source: what modules are made of, of the kernel's source, in build/vm/source.
+prepare_source() {
+  local stamp=$vm/source.stamp
+  [ ! -f "$stamp" ] || return 0
+  download_only armhf linux-source-6.1
+  rm -rf "$vm/source"
+  unpack "$vm/source" "$vm/debs"/linux-source-6.1_*.deb
+  tar -xJf "$vm/source/usr/src/linux-source-6.1.tar.xz" -C "$vm/source" --strip-components=1 --wildcards \
+    '*/drivers/gpio/*.[ch]' '*/kernel/irq/irq_sim.c' '*/drivers/counter/*.[ch]' '*/drivers/net/can/sja1000/*.h'
+  rm -rf "$vm/source/usr" "$vm/debs"/linux-source-*.deb
+  touch "$stamp"
+}
+
+# make_modules HEADERS VERSION DIRECTORY VARIABLE=VALUE...: builds DIRECTORY's modules against Debian's unpacked headers.
+make_modules() {
+  local headers=$1/usr/src/linux-headers-$2 directory=$3 log=$3.log
+  # The headers include each other, and the kbuild tools, by absolute path.
+  find "$headers" -maxdepth 1 -name Makefile -exec sed -i "s#\([ =]\)/usr/src/#\1$1/usr/src/#g" {} +
+  say "Building kernel modules for $2"
+  make -C "$headers" M="$directory" "${@:4}" -j "$jobs" modules >"$log" 2>&1 || {
+    tail -30 "$log" >&2
+    die "the kernel modules did not build; log: $log"
+  }
+}
+
 # make_initramfs TREE VERSION INIT OUTPUT MODULE...: busybox, the modules and all they need in loading order (a name
 # of the kernel's tree or the path of a .ko), and the first process.
 make_initramfs() {
