@@ -29,17 +29,18 @@ image_of() {
   printf '%s\n' "$image"
 }
 
-# prepare_source: what modules are made of, of the kernel's source, in build/vm/source.
+# prepare_source: of the kernel's source, in build/vm/source, what modules and the board's device tree are made of.
 prepare_source() {
-  local stamp=$vm/source.stamp
-  [ ! -f "$stamp" ] || return 0
+  local stamp=$vm/source.stamp parts=('drivers/gpio/*.[ch]' 'kernel/irq/irq_sim.c' 'drivers/counter/*.[ch]'
+    'drivers/net/can/sja1000/*.h' 'arch/arm/boot/dts/am33*' 'arch/arm/boot/dts/tps65217.dtsi' 'include/dt-bindings/*'
+    'include/uapi/linux/input-event-codes.h')
+  [ "$(cat "$stamp" 2>/dev/null)" != "${parts[*]}" ] || return 0
   download_only armhf linux-source-6.1
   rm -rf "$vm/source"
   unpack "$vm/source" "$vm/debs"/linux-source-6.1_*.deb
-  tar -xJf "$vm/source/usr/src/linux-source-6.1.tar.xz" -C "$vm/source" --strip-components=1 --wildcards \
-    '*/drivers/gpio/*.[ch]' '*/kernel/irq/irq_sim.c' '*/drivers/counter/*.[ch]' '*/drivers/net/can/sja1000/*.h'
+  tar -xJf "$vm/source/usr/src/linux-source-6.1.tar.xz" -C "$vm/source" --strip-components=1 --wildcards "${parts[@]/#/*/}"
   rm -rf "$vm/source/usr" "$vm/debs"/linux-source-*.deb
-  touch "$stamp"
+  printf '%s\n' "${parts[*]}" >"$stamp"
 }
 
 # make_modules HEADERS VERSION DIRECTORY VARIABLE=VALUE...: builds DIRECTORY's modules against Debian's unpacked headers.
