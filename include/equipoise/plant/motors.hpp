@@ -3,6 +3,8 @@
 // switches carry no current. Simulation only; no allocation.
 #pragma once
 
+#include <array>
+
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/samples.hpp"
@@ -19,7 +21,11 @@ class SimulatedMotors {
         resistance_ohm_(world.battery_resistance_ohm),
         battery_V_(world.battery_V) {}
 
-  void command(const MotorCommand& command) noexcept { command_ = command; }
+  void command(const MotorCommand& command) noexcept {
+    command_ = command;
+    for (std::size_t i = 0; i < std::size_t{N}; ++i)
+      held_[i] = DriveCoastCommand(motor_.T_r(), calibration_.motor_sign[i] * command.duty[i]);
+  }
   bool enabled() const noexcept { return command_.enable; }
   double battery_V() const noexcept { return battery_V_; }
 
@@ -30,11 +36,10 @@ class SimulatedMotors {
     const double no_load = motor_.no_load_rad_s(battery_V_);
     for (int i = 0; i < N; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      const double duty = calibration_.motor_sign[k] * command_.duty[k];
       const double omega_r = wheel_rate_rad_s(i) / no_load;
       const double current = motor_.bridge == BridgeType::kDriveBrake
-                                 ? duty - omega_r
-                                 : drive_coast_mean_current(motor_.T_r(), omega_r, duty);
+                                 ? calibration_.motor_sign[k] * command_.duty[k] - omega_r
+                                 : held_[k].mean_current(omega_r);
       torque(i) = stall_torque * current;
     }
     return torque;
@@ -60,6 +65,7 @@ class SimulatedMotors {
   double resistance_ohm_;
   double battery_V_;
   MotorCommand command_;
+  std::array<DriveCoastCommand, N> held_{};  // the integrator asks at many speeds per command
 };
 
 }  // namespace equipoise
