@@ -34,7 +34,13 @@ collect_module_sources() {
   # What irq_sim calls is exported to built-in code only; this is its exported equivalent.
   sed -i 's/handle_simple_irq(irq_to_desc(irqnum))/generic_handle_irq(irqnum)/' "$modules_built/irq_sim.c"
   printf 'MODULE_LICENSE("GPL");\n' >>"$modules_built/irq_sim.c"
-  sed -i '/MODULE_DEVICE_TABLE/d' "$modules_built"/*.c # the host's modpost cannot read the target's tables
+}
+
+make_target_modules() { # DIRECTORY
+  # The host's modpost cannot read the target's tables.
+  sed -i '/MODULE_DEVICE_TABLE/d' "$1"/*.c
+  make_modules "$vm/headers" "$kernel_version" "$1" ARCH=arm CROSS_COMPILE=arm-linux-gnueabihf- \
+    DEB_BUILD_ARCH="$(dpkg --print-architecture)" DEB_HOST_ARCH=armhf DEB_HOST_GNU_TYPE=arm-linux-gnueabihf
 }
 
 build_modules() {
@@ -43,8 +49,7 @@ build_modules() {
   [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ] && return 0
   rm -rf "$modules_built"
   collect_module_sources
-  make_modules "$vm/headers" "$kernel_version" "$modules_built" ARCH=arm CROSS_COMPILE=arm-linux-gnueabihf- \
-    DEB_BUILD_ARCH="$(dpkg --print-architecture)" DEB_HOST_ARCH=armhf DEB_HOST_GNU_TYPE=arm-linux-gnueabihf
+  make_target_modules "$modules_built"
   printf '%s\n' "$wanted" >"$stamp"
 }
 

@@ -43,6 +43,14 @@ prepare_source() {
   printf '%s\n' "${parts[*]}" >"$stamp"
 }
 
+# board_tree OUTPUT: the BeagleBone Black's device tree with symbols, which that of Debian's kernel packages lacks.
+board_tree() {
+  local trees=$vm/source/arch/arm/boot/dts
+  prepare_source
+  cpp -nostdinc -undef -x assembler-with-cpp -I "$vm/source/include" "$trees/am335x-boneblack.dts" "$1.dts"
+  dtc -q -@ -I dts -O dtb -i "$trees" -o "$1" "$1.dts"
+}
+
 # make_modules HEADERS VERSION DIRECTORY VARIABLE=VALUE...: builds DIRECTORY's modules against Debian's unpacked headers.
 make_modules() {
   local headers=$1/usr/src/linux-headers-$2 directory=$3 log=$3.log

@@ -30,6 +30,9 @@ PinWorld::PinWorld(Bench& bench, const equipoise::app::Board& board, const equip
     : bench_(bench),
       wiring_(board.wiring),
       world_(config.robot, config.motor, config.calibration, worldOf(config, seed)) {
+  for (const bbb_motor_t& motor : wiring_.motor) {
+    if (motor.fault.used) bench_.drivePin(motor.fault.chip, motor.fault.line, true);  // no bridge complains
+  }
   show(world_.sense());
 }
 
