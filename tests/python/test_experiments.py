@@ -7,6 +7,7 @@ import sys
 import pytest
 from equipoise_tools.experiments import coverage, framework
 from equipoise_tools.experiments.framework import Result
+from equipoise_tools.experiments.runs import summarise
 
 
 def result() -> Result:
@@ -63,9 +64,33 @@ def test_unknown_names_are_refused():
     assert "no experiment tabel; there are: " in done.stderr
 
 
-@pytest.mark.parametrize("name", ["geometry", "motor_selection"])
+@pytest.mark.parametrize(
+    "name", ["geometry", "motor_selection", "friction_identification", "friction_compensation"]
+)
 def test_findings_of_the_quick_experiments_hold(name, tmp_path):
     found = framework.load(name).run(tmp_path)
     assert found.findings
     assert [f.text for f in found.findings if not f.holds] == []
     assert all((tmp_path / picture).stat().st_size > 10000 for picture in found.pictures)
+
+
+def estimators(**options) -> dict:
+    return summarise(compare=True, duration_s=20, **options)["estimators"]
+
+
+@pytest.mark.parametrize("yaw_hz", [0.0, 0.75, -1.0])
+def test_kf_and_ekf_are_equal_in_ball_speed(yaw_hz):
+    """[T] Fig. 6.14; a millimetre per second is a tenth of the printed errors' last digit."""
+    found = estimators(yaw_hz=yaw_hz)
+    gap = found["ekf"]["ball_speed_rmse_m_s"] - found["kf_attitude"]["ball_speed_rmse_m_s"]
+    assert abs(gap) < 0.001
+
+
+def test_dmp_and_kf_outlast_the_printed_ekf_at_1_5_hz():
+    held = {}
+    for estimator in ("kf_attitude", "ekf13_published"):
+        summary = summarise(
+            yaw_hz=1.5, drive_mps=0.05, controller="thesis", estimator=estimator, duration_s=30
+        )
+        held[estimator] = summary["fell_at_s"] if summary["fell"] else summary["duration_s"]
+    assert held["kf_attitude"] > held["ekf13_published"]
