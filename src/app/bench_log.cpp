@@ -2,11 +2,16 @@
 
 #include <lcm/lcm.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <equipoise/bench_t.hpp>
+#include <limits>
 #include <memory>
+#include <sstream>
 
 #include "commands.hpp"
 
@@ -23,6 +28,13 @@ using LogFile = std::unique_ptr<lcm_eventlog_t, CloseLog>;
 struct FreeEvent {
   void operator()(lcm_eventlog_event_t* event) const { lcm_eventlog_free_event(event); }
 };
+
+void append(const std::string& path, const BenchRow& row, BenchLog* log) {
+  if (!log->rows.empty() && !(row.t_s > log->rows.back().t_s)) {
+    throw InputError(path + ": time does not advance at sample " + std::to_string(log->rows.size()));
+  }
+  log->rows.push_back(row);
+}
 
 }  // namespace
 
@@ -52,7 +64,9 @@ void write_bench_log(const std::string& path, const BenchLog& log) {
   if (std::fflush(file->f) != 0) throw InputError(path + ": cannot be written: " + std::strerror(errno));
 }
 
-BenchLog read_bench_log(const std::string& path) {
+namespace {
+
+BenchLog read_lcm(const std::string& path) {
   const LogFile file(lcm_eventlog_create(path.c_str(), "r"));
   if (file == nullptr) throw InputError(path + ": cannot be opened: " + std::strerror(errno));
   BenchLog log;
@@ -72,16 +86,67 @@ BenchLog read_bench_log(const std::string& path) {
                                          : LoggedBridge::kUnknown;
     }
     const double t_s = 1e-6 * static_cast<double>(message.utime);
-    if (!log.rows.empty() && t_s <= log.rows.back().t_s) {
-      throw InputError(path + ": " + kChannel + ": time does not advance at sample " +
-                       std::to_string(log.rows.size()));
-    }
-    log.rows.push_back({t_s, message.u, message.current_A, message.supply_V, message.angle_rad});
+    append(path, {t_s, message.u, message.current_A, message.supply_V, message.angle_rad}, &log);
   }
   if (events == 0) throw InputError(path + ": is not an LCM event log, or holds no whole event");
   if (log.rows.empty())
     throw InputError(path + ": no " + kChannel + " channel; record it with motor-bench --log");
   return log;
+}
+
+std::vector<std::string> cells(const std::string& line) {
+  std::vector<std::string> out;
+  std::istringstream stream(line);
+  for (std::string cell; std::getline(stream, cell, ',');) {
+    cell.erase(std::remove_if(cell.begin(), cell.end(), [](unsigned char c) { return std::isspace(c); }),
+               cell.end());
+    out.push_back(cell);
+  }
+  return out;
+}
+
+BenchLog read_csv(const std::string& path) {
+  static constexpr std::array<double BenchRow::*, 5> kFields{
+      &BenchRow::t_s, &BenchRow::u, &BenchRow::current_A, &BenchRow::supply_V, &BenchRow::angle_rad};
+  static const std::array<std::string, 5> kNames{"t_s", "u", "current_A", "supply_V", "angle_rad"};
+  std::istringstream text(read_text(path));
+  std::string line;
+  std::getline(text, line);
+  const std::vector<std::string> head = cells(line);
+  std::array<std::size_t, 5> column{};
+  for (std::size_t f = 0; f < kNames.size(); ++f) {
+    column[f] = static_cast<std::size_t>(std::find(head.begin(), head.end(), kNames[f]) - head.begin());
+    const bool optional = kNames[f] == "current_A" || kNames[f] == "supply_V";
+    if (column[f] == head.size() && !optional) {
+      throw InputError(path + ":1: no column " + kNames[f] + "; expected t_s,u,current_A,supply_V,angle_rad");
+    }
+  }
+  BenchLog log;
+  for (int number = 2; std::getline(text, line); ++number) {
+    const std::vector<std::string> row = cells(line);
+    if (row.empty()) continue;
+    BenchRow sample;
+    for (std::size_t f = 0; f < kNames.size(); ++f) {
+      sample.*kFields[f] = std::numeric_limits<double>::quiet_NaN();
+      if (column[f] == head.size()) continue;
+      const std::string cell = column[f] < row.size() ? row[column[f]] : "";
+      char* end = nullptr;
+      sample.*kFields[f] = std::strtod(cell.c_str(), &end);
+      if (cell.empty() || *end != '\0') {
+        throw InputError(path + ":" + std::to_string(number) + ": " + kNames[f] + ": \"" + cell +
+                         "\" is not a number");
+      }
+    }
+    append(path, sample, &log);
+  }
+  return log;
+}
+
+}  // namespace
+
+BenchLog read_bench_log(const std::string& path) {
+  const bool csv = path.size() > 4 && path.compare(path.size() - 4, 4, ".csv") == 0;
+  return csv ? read_csv(path) : read_lcm(path);
 }
 
 }  // namespace equipoise::app

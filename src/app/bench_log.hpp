@@ -1,5 +1,6 @@
-// LCM event logs of a bench, channel EQUIPOISE_BENCH. In: samples -> out: file, and back.
-// InputError names the file and what is wrong with it. Not RT-safe.
+// Logs of a bench: LCM event logs, channel EQUIPOISE_BENCH, and to read also CSV with a header
+// t_s,u,current_A,supply_V,angle_rad (any order; others are ignored; without a sensor no current_A).
+// In: samples -> out: file, and back. InputError names the file and what is wrong with it. Not RT-safe.
 #pragma once
 
 #include <string>
@@ -24,6 +25,7 @@ struct BenchLog {
 };
 
 void write_bench_log(const std::string& path, const BenchLog& log);
+/// By its name: .csv, else LCM.
 BenchLog read_bench_log(const std::string& path);
 
 }  // namespace equipoise::app

@@ -14,6 +14,8 @@ void add_commands(CLI::App& app, int* status) {
   add_geometry(app, status);
   add_attitude(app, status);
   add_motor_bench(app, status);
+  add_friction_rig(app, status);
+  add_identify(app, status);
   add_bench(app, status);
   add_campaign(app, status);
   add_guard(app, status);

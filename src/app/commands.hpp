@@ -26,6 +26,8 @@ void add_bridge(CLI::App& app, int* status);
 void add_geometry(CLI::App& app, int* status);
 void add_attitude(CLI::App& app, int* status);
 void add_motor_bench(CLI::App& app, int* status);
+void add_friction_rig(CLI::App& app, int* status);
+void add_identify(CLI::App& app, int* status);
 void add_bench(CLI::App& app, int* status);
 void add_campaign(CLI::App& app, int* status);
 void add_guard(CLI::App& app, int* status);

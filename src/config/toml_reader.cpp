@@ -13,7 +13,7 @@ namespace {
 
 std::string at(const std::string& path, const toml::source_region& where) {
   if (where.begin.line == 0) return path;
-  return path + ":" + std::to_string(where.begin.line);
+  return (where.path ? *where.path : path) + ":" + std::to_string(where.begin.line);
 }
 
 std::string shortest(double value) {
@@ -62,7 +62,7 @@ void apply_override(toml::table& root, const std::string& text) {
     const auto first = source->begin();
     const toml::key& key = first->first;
     const toml::node& value = first->second;
-    if (!target->contains(key)) {
+    if (!target->contains(key) && key != "include") {
       throw ConfigError("--set " + text + ": no such key in the configuration");
     }
     if (value.is_table() && target->get(key)->is_table()) {
@@ -75,26 +75,70 @@ void apply_override(toml::table& root, const std::string& text) {
   }
 }
 
+/// Replaces values of `root` by those of a fragment; a key that the configuration lacks is a mistake.
+void merge(toml::table& root, toml::table&& fragment, const std::string& path, const std::string& where) {
+  for (auto&& [key, value] : fragment) {
+    const std::string name = where.empty() ? std::string(key.str()) : where + "." + std::string(key.str());
+    if (!root.contains(key)) {
+      throw ConfigError(at(path, value.source()) + ": " + name + ": no such key in the configuration");
+    }
+    if (value.is_table() && root.get(key)->is_table()) {
+      merge(*root.get_as<toml::table>(key.str()), std::move(*value.as_table()), path, name);
+    } else {  // moved nodes remember where they stood
+      value.visit([&](auto& v) { root.insert_or_assign(key, std::move(v)); });
+    }
+  }
+}
+
+toml::table parsed(std::istream& text, const std::string& origin) {
+  try {
+    return toml::parse(text, origin);
+  } catch (const toml::parse_error& error) {
+    throw ConfigError(at(origin, error.source()) + ": " + std::string(error.description()));
+  }
+}
+
+/// `include = ["fragment.toml"]`: files beside the configuration whose values replace its own, in order.
+void apply_includes(toml::table& root, const std::string& path) {
+  const toml::node* include = root.get("include");
+  if (include == nullptr) return;
+  const toml::array* files = include->as_array();
+  if (files == nullptr || (!files->empty() && !files->is_homogeneous<std::string>())) {
+    throw ConfigError(path + ": include: expected an array of file names, e.g. include = [\"motor.toml\"]");
+  }
+  const std::string folder = path.substr(0, path.rfind('/') + 1);
+  std::vector<std::string> names;
+  for (const toml::node& node : *files) names.push_back(node.as_string()->get());
+  root.erase("include");
+  for (const std::string& name : names) {
+    const std::string fragment = name.rfind('/', 0) == 0 ? name : folder + name;
+    std::ifstream file(fragment);
+    if (!file) throw ConfigError(path + ": include: " + fragment + ": cannot be opened");
+    merge(root, parsed(file, fragment), fragment, "");
+  }
+}
+
 }  // namespace
 
 Document::Document(const std::string& path, const std::vector<std::string>& overrides) : path_(path) {
   std::ifstream file(path);
   if (!file) throw ConfigError(path + ": cannot be opened; give a configuration with --config FILE");
-  try {
-    root_ = toml::parse(file, path);
-  } catch (const toml::parse_error& error) {
-    throw ConfigError(at(path, error.source()) + ": " + std::string(error.description()));
+  root_ = parsed(file, path);
+  // An include given with --set comes before the other overrides, so that these have the last word.
+  const auto includes = [](const std::string& text) { return text.rfind("include=", 0) == 0; };
+  for (const std::string& text : overrides) {
+    if (includes(text)) apply_override(root_, text);
   }
-  for (const std::string& text : overrides) apply_override(root_, text);
+  apply_includes(root_, path);
+  for (const std::string& text : overrides) {
+    if (!includes(text)) apply_override(root_, text);
+  }
 }
 
 Document Document::parse(const std::string& text, const std::string& origin) {
   Document document(origin);
-  try {
-    document.root_ = toml::parse(text, origin);
-  } catch (const toml::parse_error& error) {
-    throw ConfigError(at(origin, error.source()) + ": " + std::string(error.description()));
-  }
+  std::istringstream stream(text);
+  document.root_ = parsed(stream, origin);
   return document;
 }
 

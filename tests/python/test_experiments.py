@@ -3,10 +3,14 @@
 import json
 import subprocess
 import sys
+import tomllib
 
+import numpy as np
 import pytest
-from equipoise_tools.experiments import coverage, framework
+from equipoise_tools.calibrate_disturbance import SEARCHED, Search, fragment
+from equipoise_tools.experiments import bridge_modes, coverage, framework
 from equipoise_tools.experiments.framework import Result
+from equipoise_tools.experiments.runs import summarise
 
 
 def result() -> Result:
@@ -63,9 +67,61 @@ def test_unknown_names_are_refused():
     assert "no experiment tabel; there are: " in done.stderr
 
 
-@pytest.mark.parametrize("name", ["geometry", "motor_selection"])
+@pytest.mark.parametrize(
+    "name", ["geometry", "motor_selection", "friction_identification", "friction_compensation"]
+)
 def test_findings_of_the_quick_experiments_hold(name, tmp_path):
     found = framework.load(name).run(tmp_path)
     assert found.findings
     assert [f.text for f in found.findings if not f.holds] == []
     assert all((tmp_path / picture).stat().st_size > 10000 for picture in found.pictures)
+
+
+def estimators(**options) -> dict:
+    return summarise(compare=True, duration_s=20, **options)["estimators"]
+
+
+@pytest.mark.parametrize("yaw_hz", [0.0, 0.75, -1.0])
+def test_kf_and_ekf_are_equal_in_ball_speed(yaw_hz):
+    """[T] Fig. 6.14; a millimetre per second is a tenth of the printed errors' last digit."""
+    found = estimators(yaw_hz=yaw_hz)
+    gap = found["ekf"]["ball_speed_rmse_m_s"] - found["kf_attitude"]["ball_speed_rmse_m_s"]
+    assert abs(gap) < 0.001
+
+
+def test_dmp_and_kf_outlast_the_printed_ekf_at_1_5_hz():
+    held = {}
+    for estimator in ("kf_attitude", "ekf13_published"):
+        summary = summarise(
+            yaw_hz=1.5, drive_mps=0.05, controller="thesis", estimator=estimator, duration_s=30
+        )
+        held[estimator] = summary["fell_at_s"] if summary["fell"] else summary["duration_s"]
+    assert held["kf_attitude"] > held["ekf13_published"]
+
+
+@pytest.mark.parametrize("pwm_hz", [1000, 20000])
+def test_compensated_coasting_balances_the_edumip_as_braking_does(pwm_hz):
+    means = {
+        mode: sum(bridge_modes.variance(bridge_modes.MODES[mode], pwm_hz, seed) for seed in (1, 2))
+        for mode in ("brake", "coast, compensated")
+    }
+    assert means["coast, compensated"] == pytest.approx(means["brake"], rel=0.15)
+
+
+def test_the_strategy_of_the_calibration_finds_a_minimum():
+    target = np.linspace(0.2, 0.8, 6)
+    strategy = Search(np.full(6, 0.5), np.random.default_rng(1))
+    best = np.inf
+    for _ in range(60):
+        points = strategy.ask()
+        values = np.sum((points - target) ** 2 * np.arange(1, 7), axis=1)
+        strategy.tell(points, values, best)
+        best = min(best, values.min())
+    assert best < 1e-3
+
+
+def test_fragment_has_every_setting_once(tmp_path):
+    start = {key: begin for key, (_, _, begin) in SEARCHED.items()}
+    table = tomllib.loads(fragment(start, 0.0, "test"))
+    assert table["world"]["full"]["disturbance"]["imu_misalignment_rad"][2] == 0.0
+    assert len(table["estimator"]["ekf13_published"]["q"]) == 13

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/plant/diode_drop.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/samples.hpp"
 
@@ -17,6 +18,7 @@ class SimulatedMotors {
         calibration_(calibration),
         open_V_(world.battery_V),
         resistance_ohm_(world.battery_resistance_ohm),
+        diode_drop_V_(world.diode_drop_V),
         battery_V_(world.battery_V) {}
 
   void command(const MotorCommand& command) noexcept { command_ = command; }
@@ -32,10 +34,7 @@ class SimulatedMotors {
       const auto k = static_cast<std::size_t>(i);
       const double duty = calibration_.motor_sign[k] * command_.duty[k];
       const double omega_r = wheel_rate_rad_s(i) / no_load;
-      const double current = motor_.bridge == BridgeType::kDriveBrake
-                                 ? duty - omega_r
-                                 : drive_coast_mean_current(motor_.T_r(), omega_r, duty);
-      torque(i) = stall_torque * current;
+      torque(i) = stall_torque * current_over_stall(omega_r, duty);
     }
     return torque;
   }
@@ -54,10 +53,18 @@ class SimulatedMotors {
   }
 
  private:
+  double current_over_stall(double omega_r, double duty) const noexcept {
+    if (motor_.bridge == BridgeType::kDriveBrake) return duty - omega_r;
+    if (diode_drop_V_ == 0.0) return drive_coast_mean_current(motor_.T_r(), omega_r, duty);
+    const double opposing = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
+    return drive_coast_mean_current_with_drop(motor_.T_r(), omega_r, duty, opposing);
+  }
+
   MotorParameters motor_;
   Calibration calibration_;
   double open_V_;
   double resistance_ohm_;
+  double diode_drop_V_;
   double battery_V_;
   MotorCommand command_;
 };

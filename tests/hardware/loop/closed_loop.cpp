@@ -12,9 +12,9 @@ constexpr int kMotors = 3;
 constexpr int kPoll_us = 200;
 constexpr int kPatiencePolls = 5000;
 
-equipoise::WorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
-  equipoise::WorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kFull)];
-  params.seed = seed;
+equipoise::MbbrWorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
+  equipoise::MbbrWorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kFull)];
+  params.common.seed = seed;
   return params;
 }
 }  // namespace

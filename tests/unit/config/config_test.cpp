@@ -90,6 +90,22 @@ TEST(Config, OverridesApplyAndAreChecked) {
   EXPECT_THAT(error_of(kMbbr, {"friction"}), HasSubstr("expected key=value"));
 }
 
+TEST(Config, FragmentsReplaceValuesAndOverridesHaveTheLastWord) {
+  const std::string fragment = testing::TempDir() + "fragment_" + std::to_string(::getpid()) + ".toml";
+  std::ofstream(fragment) << "[motor]\nresistance_ohm = 4.5\ninductance_H = 1e-3\n";
+  const std::string include = "include=[\"" + fragment + "\"]";
+  const LoadedMbbr loaded = load_mbbr(kMbbr, {"motor.inductance_H=2e-3", include});
+  EXPECT_EQ(loaded.config.motor.resistance_ohm, 4.5);
+  EXPECT_EQ(loaded.config.motor.inductance_H, 2e-3);
+  std::ofstream(fragment) << "[motor]\nresistence_ohm = 4.5\n";
+  EXPECT_THAT(error_of(kMbbr, {include}), HasSubstr(fragment + ":2: motor.resistence_ohm: no such key"));
+  std::ofstream(fragment) << "[motor]\n\nresistance_ohm = -1.0\n";
+  EXPECT_THAT(error_of(kMbbr, {include}), HasSubstr(fragment + ":3: motor.resistance_ohm: -1 is out of"));
+  std::filesystem::remove(fragment);
+  EXPECT_THAT(error_of(kMbbr, {include}), HasSubstr("cannot be opened"));
+  EXPECT_THAT(error_of(kMbbr, {"include=3"}), HasSubstr("expected an array of file names"));
+}
+
 TEST(Config, AMountThatIsNoRotationIsRefused) {
   EXPECT_THAT(error_of(kMbbr, {"calibration.R_BS=[1,0,0,0,1,0,0,0,-1]"}), HasSubstr("not a rotation matrix"));
 }

@@ -33,19 +33,29 @@ def equipoise_json(*arguments: object) -> dict:
     return json.loads(equipoise(*arguments, "--json", "-"))
 
 
-def simulate(
-    config: str = "config/mbbr.toml", sets: dict[str, object] | None = None, **options
-) -> tuple[dict, Log]:
-    """(summary, log) of a run; options become --yaw-hz and so on, `compare=True` a flag, `sets` --set."""
-    arguments: list[object] = ["sim", "--config", config, "--telemetry", "off", "--json", "-"]
+def _sim(log: Path, config: str, sets: dict[str, object] | None, options: dict) -> dict:
+    arguments: list[object] = ["sim", "--config", config, "--telemetry", "off", "--json", "-", "--log", log]
     for key, value in options.items():
         flag = "--" + key.replace("_", "-")
         arguments += [flag] if value is True else [flag, value]
     for key, value in (sets or {}).items():
         arguments += ["--set", f"{key}={value}"]
+    return json.loads(equipoise(*arguments, fails=True))
+
+
+def summarise(config: str = "config/mbbr.toml", sets: dict[str, object] | None = None, **options) -> dict:
+    """Summary of a run; options become --yaw-hz and so on, `compare=True` a flag, `sets` --set."""
+    with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
+        return _sim(Path(folder) / "run.lcm", config, sets, options)
+
+
+def simulate(
+    config: str = "config/mbbr.toml", sets: dict[str, object] | None = None, **options
+) -> tuple[dict, Log]:
+    """(summary, log) of such a run."""
     with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
         log = Path(folder) / "run.lcm"
-        summary = json.loads(equipoise(*arguments, "--log", log, fails=True))
+        summary = _sim(log, config, sets, options)
         return summary, read_log(log)
 
 

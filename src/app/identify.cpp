@@ -1,0 +1,132 @@
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <memory>
+
+#include "commands.hpp"
+#include "equipoise/config.hpp"
+#include "identification.hpp"
+
+namespace equipoise::app {
+namespace {
+
+struct Arguments {
+  std::string log;
+  std::string out;
+  std::string json;
+  double inertia_kg_m2 = 0.0;
+  FrictionRig rig;
+};
+
+/// What becomes part of a configuration: the table and its keys.
+struct Keys {
+  std::string table;
+  std::vector<std::string> keys;
+};
+
+/// Only what the data determine goes into the fragment; the rest is said in comments.
+void write_fragment(const Arguments& a, const Keys& wanted, const Identified& found) {
+  std::ofstream file(a.out);
+  file.precision(5);
+  file << "# Identified from " << a.log << "; name it in the configuration: include = [\"" << a.out
+       << "\"]\n";
+  const auto is_key = [&](const std::string& name) {
+    return std::find(wanted.keys.begin(), wanted.keys.end(), name) != wanted.keys.end();
+  };
+  for (const Estimate& e : found.estimates) {
+    if (!e.determined()) {
+      file << "# " << e.name << ": the data do not determine it\n";
+    } else if (!is_key(e.name)) {
+      file << "# " << e.name << " = " << e.value << "  # +- " << e.half_width << ", 95 %\n";
+    }
+  }
+  file << "[" << wanted.table << "]\n";
+  for (const std::string& key : wanted.keys) {
+    const Estimate* e = found.find(key);
+    if (e == nullptr || !e->determined()) continue;
+    file << key << " = " << e->value << "  # +- " << e->half_width << ", 95 %\n";
+  }
+  if (!file.flush()) throw InputError(a.out + ": cannot be written");
+}
+
+void print(const Identified& found, std::FILE* out) {
+  for (const Estimate& e : found.estimates) {
+    std::fprintf(out, "%-32s %12.5g +- %-10.2g %s\n", e.name.c_str(), e.value, e.half_width,
+                 e.determined() ? "" : "not determined by these data");
+  }
+  std::fprintf(out, "R^2 %.4f", found.r_squared);
+  if (found.r_squared_torque != 0.0) std::fprintf(out, ", of the torque %.4f", found.r_squared_torque);
+  std::fprintf(out, "\n");
+}
+
+nlohmann::json to_json(const Arguments& a, const Identified& found) {
+  nlohmann::json estimates = nlohmann::json::object();
+  for (const Estimate& e : found.estimates) {
+    const bool bounded = std::isfinite(e.half_width);
+    estimates[e.name] = {{"value", e.value},
+                         {"half_width_95", bounded ? nlohmann::json(e.half_width) : nlohmann::json(nullptr)},
+                         {"determined", e.determined()}};
+  }
+  nlohmann::json json{{"log", a.log}, {"estimates", estimates}, {"r_squared", found.r_squared}};
+  if (found.r_squared_torque != 0.0) json["r_squared_torque"] = found.r_squared_torque;
+  return json;
+}
+
+int report(const Arguments& a, const Identified& found, const Keys& wanted) {
+  if (!found.refused.empty()) throw InputError(a.log + ": " + found.refused);
+  print(found, a.json == "-" ? stderr : stdout);
+  if (!a.out.empty()) write_fragment(a, wanted, found);
+  if (!a.json.empty()) write_json(to_json(a, found), a.json);
+  return 0;
+}
+
+void add_common(CLI::App* command, const std::shared_ptr<Arguments>& a) {
+  command->add_option("log", a->log, "log of a bench: LCM with EQUIPOISE_BENCH, or CSV")->required();
+  command->add_option("--out", a->out, "TOML fragment for the configuration's include");
+  command->add_option("--json", a->json, "output file, - for stdout");
+}
+
+void add_motor(CLI::App* identify, const std::shared_ptr<Arguments>& a, int* status) {
+  auto* motor = identify->add_subcommand("motor", "R, k, L and friction from a drive/brake log");
+  add_common(motor, a);
+  motor->add_option("--inertia-kg-m2", a->inertia_kg_m2, "of the flywheel, when it is known")
+      ->check(CLI::Range(1e-7, 10.0));
+  motor->callback([=] {
+    *status = report(*a, identify_motor(read_bench_log(a->log), a->inertia_kg_m2),
+                     {"motor", {"resistance_ohm", "torque_constant_N_m_A", "inductance_H"}});
+  });
+}
+
+void add_friction(CLI::App* identify, const std::shared_ptr<Arguments>& a, int* status) {
+  auto* friction =
+      identify->add_subcommand("friction", "J_f, mu_c, mu_v of a ball on a flywheel, [T] (5.34)-(5.37)");
+  add_common(friction, a);
+  friction->add_option("--k1-N-m", a->rig.k1_N_m, "torque about the ball per unit of u")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-6, 100.0));
+  friction->add_option("--k2-ball-N-m-s", a->rig.k2_ball_N_m_s, "back-EMF about the ball")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 10.0));
+  friction
+      ->add_option("--radius-ratio", a->rig.flywheel_over_ball_radius, "flywheel's radius over the ball's")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 100.0));
+  friction->add_flag("--separate-directions", a->rig.separate_directions, "Coulomb friction per direction");
+  friction->add_flag("--stribeck", a->rig.stribeck, "excess at low speed");
+  friction->callback([=] {
+    *status = report(*a, identify_friction(read_bench_log(a->log), a->rig),
+                     {"robot", {"coulomb_friction_N_m", "viscous_friction_N_m_s"}});
+  });
+}
+
+}  // namespace
+
+void add_identify(CLI::App& app, int* status) {
+  auto* command = app.add_subcommand("identify", "Parameters from bench logs, with confidence intervals");
+  command->require_subcommand(1);
+  auto a = std::make_shared<Arguments>();
+  add_motor(command, a, status);
+  add_friction(command, a, status);
+}
+
+}  // namespace equipoise::app
