@@ -8,9 +8,8 @@
 #include <memory>
 
 #include "commands.hpp"
-#include "equipoise/runtime/realtime.hpp"
-#include "equipoise/runtime/supervisor.hpp"
 #include "firmware.hpp"
+#include "watched_flight.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -98,32 +97,22 @@ nlohmann::json bench_wake(const Arguments& a) {
   runtime::Supervisor supervisor({}, &page, 0);
   runtime::TimeHistogram ours;
   runtime::TimeHistogram bare;
-  const auto sleep_until = [](std::int64_t at_ns) {
-    const timespec at{static_cast<time_t>(at_ns / 1'000'000'000), static_cast<long>(at_ns % 1'000'000'000)};
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
-    return runtime::monotonic_now_ns();
-  };
   std::int64_t due_ns = runtime::monotonic_now_ns() + kPeriod_ns;
   for (int i = 0; i < 2 * a.wakes; ++i) {
     const bool is_ours = i / kTurn % 2 == 0;
-    const std::int64_t now_ns = sleep_until(due_ns);
+    runtime::sleep_until(due_ns);
+    const std::int64_t now_ns = runtime::monotonic_now_ns();
     (is_ours ? ours : bare).add(now_ns - due_ns);
     if (is_ours) {
       RawSample raw;
       raw.t_ns = due_ns;
       (void)supervisor.begin(now_ns, raw);
-      supervisor.end(0);
+      supervisor.end(true, 0);
     }
     due_ns += kPeriod_ns;
     if (now_ns > due_ns) due_ns = now_ns + kPeriod_ns;
   }
-  const auto summary = [](const runtime::TimeHistogram& h) {
-    return nlohmann::json{{"p50_us", 1e-3 * static_cast<double>(h.quantile_ns(0.5))},
-                          {"p99_us", 1e-3 * static_cast<double>(h.quantile_ns(0.99))},
-                          {"max_us", 1e-3 * static_cast<double>(h.max_ns())},
-                          {"wakes", h.total()}};
-  };
-  return {{"loop", summary(ours)}, {"clock_nanosleep", summary(bare)}};
+  return {{"loop", to_json(ours)}, {"clock_nanosleep", to_json(bare)}};
 }
 
 int run(const Arguments& a) {
@@ -131,11 +120,7 @@ int run(const Arguments& a) {
                                   [&](auto firmware) { return bench_tick<decltype(firmware)>(a); });
   {
     const runtime::Realtime realtime(runtime::RealtimeWish{});
-    for (std::size_t i = 0; i < runtime::kRealtimeItems; ++i) {
-      const runtime::RealtimeResult& r = realtime.results()[i];
-      out["realtime"][runtime::kRealtimeItemNames[i]] = {
-          {"wanted", r.wanted}, {"obtained", r.obtained}, {"errno", r.error}};
-    }
+    out["realtime"] = to_json(realtime);
     out["realtime_complete"] = realtime.complete();
     out["wake"] = bench_wake(a);
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "equipoise/runtime/loop.hpp"
+#include "equipoise/runtime/supervisor.hpp"
 #include "firmware.hpp"
 #include "hardware.hpp"
 #include "interrupt.hpp"
@@ -32,9 +33,12 @@ struct FlightLimits {
   bool end_on_fall = true;
 };
 
-template <class Pipeline, class Commands>
+inline runtime::TickTiming timing_of(const runtime::Supervisor& s) noexcept { return s.timing().now(); }
+inline runtime::TickTiming timing_of(const runtime::NoSupervisor&) noexcept { return {}; }
+
+template <class Pipeline, class Commands, class Supervisor>
 Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits& limits,
-           runtime::Telemetry& telemetry) {
+           Supervisor& supervisor, runtime::Telemetry& telemetry) {
   Hardware hardware(io);
   Flight flight;
   runtime::TickRecord record{};
@@ -55,13 +59,17 @@ Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits
       flight.fell_at_s = static_cast<double>(tick) * kTickS;
     }
     record_tick(tick, now_ns, raw, command, t, pipeline, &record);
+    const runtime::TickTiming timing = timing_of(supervisor);
+    record.wake_late_ns = timing.wake_late_ns;
+    record.compute_ns = timing.compute_ns;
+    record.overruns = timing.overruns;
     record.dropped_records = telemetry.dropped();
     telemetry.hand_over(record);
     // Nothing flies unrecorded.
     if (tick >= last_tick || (flight.fell && limits.end_on_fall) || telemetry.log_failed()) done = true;
     if (interrupted.load(std::memory_order_relaxed)) done = true;
   };
-  const runtime::LoopEnd end = runtime::run_loop(hardware, pipeline, commands, on_tick, done);
+  const runtime::LoopEnd end = runtime::run_loop(hardware, pipeline, commands, on_tick, done, supervisor);
   flight.ticks = end.ticks;
   flight.error = end.error;
   return flight;

@@ -1,55 +1,22 @@
 // `equipoise guard`: the process that owns the bridge enables and outlives the loop.
 #include "guard.hpp"
 
-#include <sys/socket.h>
-#include <sys/un.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <csignal>
-#include <cstddef>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 
+#include "board.hpp"
 #include "commands.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 #include "equipoise/runtime/realtime.hpp"
-#include "equipoise/runtime/supervisor.hpp"
+#include "interrupt.hpp"
+#include "service_notify.hpp"
 
 namespace equipoise::app {
-namespace {
-
-std::atomic<bool> stopping{false};
-void on_signal(int) { stopping.store(true); }
-
-/// systemd's protocol: one datagram to the socket it names. Silent where there is no systemd.
-void notify_systemd(const char* message) {
-  const char* name = std::getenv("NOTIFY_SOCKET");
-  if (name == nullptr || name[0] == '\0') return;
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::size_t length = std::strlen(name);
-  if (length >= sizeof address.sun_path) return;
-  std::memcpy(address.sun_path, name, length);
-  if (name[0] == '@') address.sun_path[0] = '\0';  // abstract
-  const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) return;
-  (void)sendto(fd, message, std::strlen(message), MSG_DONTWAIT | MSG_NOSIGNAL,
-               reinterpret_cast<const sockaddr*>(&address),
-               static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length));
-  close(fd);
-}
-
-void sleep_until(std::int64_t at_ns) {
-  timespec at{};
-  at.tv_sec = at_ns / 1'000'000'000;
-  at.tv_nsec = at_ns % 1'000'000'000;
-  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
-}
-
-}  // namespace
-
 GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::HeartbeatPage& page,
                     const std::atomic<bool>& stop) {
   GuardEnd end;
@@ -61,27 +28,30 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
   std::int64_t next_watchdog_ns = 0;
   while (!stop.load(std::memory_order_relaxed)) {
     due_ns += poll_ns;
-    sleep_until(due_ns);
+    runtime::sleep_until(due_ns);
     const std::int64_t now_ns = runtime::monotonic_now_ns();
     if (now_ns - due_ns > options.period_ns) due_ns = now_ns;  // late ourselves: no burst of polls
     page.guard.fetch_add(1, std::memory_order_release);
     const bool alive = loop.alive(page.loop.load(std::memory_order_acquire), now_ns);
-    if (alive && !on) {
+    const bool wanted = alive && page.want_enable.load(std::memory_order_relaxed) != 0;
+    if (wanted && !on) {
       const int error = bridges.enable();
       on = error == 0;
       if (error != 0) end.error = error;
-    } else if (!alive && on) {
+    } else if (!wanted && on) {
       const int error = bridges.off();
       if (error != 0) end.error = error;
       on = false;
-      ++end.cuts;
-      end.last_cut_ns = runtime::monotonic_now_ns();
-      page.cut.fetch_add(1, std::memory_order_release);
+      if (!alive) {
+        ++end.cuts;
+        end.last_cut_ns = runtime::monotonic_now_ns();
+        page.cut.fetch_add(1, std::memory_order_release);
+      }
     } else if (!alive) {
       (void)bridges.off();  // a stopped loop that wakes up may still write one old duty
     }
     if (now_ns >= next_watchdog_ns) {
-      notify_systemd("WATCHDOG=1");
+      notify_service_manager("WATCHDOG=1");
       next_watchdog_ns = now_ns + options.watchdog_ns;
     }
   }
@@ -94,32 +64,47 @@ namespace {
 
 struct Arguments {
   std::string heartbeat = runtime::kDefaultHeartbeat;
+  std::string board;
   std::string enable;
   std::vector<std::string> pwm;
   double period_ms = 5.0;
   int silent_ticks = 2;
   int priority = 90;
+  int parent = 0;
 };
 
+std::unique_ptr<Bridges> bridges_of(const Arguments& a) {
+  if (a.board.empty() == a.pwm.empty())
+    throw InputError("guard needs either --board FILE or --pwm FILE...: what shall it switch off?");
+  if (a.board.empty()) return std::make_unique<FileBridges>(a.enable, a.pwm);
+  return std::make_unique<BoardBridges>(load_wiring(a.board).wiring);
+}
+
+/// The kernel tells us when the loop's thread has ended, so that no guard outlives its robot's process.
+bool follow(int parent) {
+  if (prctl(PR_SET_PDEATHSIG, SIGTERM) != 0) return false;
+  return getppid() == parent;  // it may have ended before we asked
+}
+
 int run(const Arguments& a) {
-  FileBridges bridges(a.enable, a.pwm);
+  watch_interrupts();
+  const auto bridges = bridges_of(a);
+  if (a.parent != 0 && !follow(a.parent)) return 0;
   runtime::SharedHeartbeat heartbeat(a.heartbeat, runtime::SharedHeartbeat::Role::kGuard);
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
   runtime::RealtimeWish wish;
   wish.priority = a.priority;
   wish.shallow_idle = false;  // the loop holds it
   const runtime::Realtime realtime(wish);
-  if (!realtime.complete()) {
+  if (!realtime.complete() && a.parent == 0) {  // a parent has said it already
     std::fprintf(stderr, "equipoise: warning: guard without full real time:\n%s\n",
                  realtime.complaint().c_str());
   }
   GuardOptions options;
   options.period_ns = static_cast<std::int64_t>(a.period_ms * 1e6);
   options.silent_ticks = a.silent_ticks;
-  notify_systemd("READY=1");
-  const GuardEnd end = guard_loop(options, bridges, heartbeat.page(), stopping);
-  notify_systemd("STOPPING=1");
+  notify_service_manager("READY=1");
+  const GuardEnd end = guard_loop(options, *bridges, heartbeat.page(), interrupted);
+  notify_service_manager("STOPPING=1");
   if (end.error != 0) {
     std::fprintf(stderr, "equipoise: guard: a bridge could not be switched: %s\n", std::strerror(-end.error));
     return 1;
@@ -133,17 +118,20 @@ void add_guard(CLI::App& app, int* status) {
   auto* command = app.add_subcommand("guard", "stop the motors when the loop is dead, stopped or hanging");
   auto a = std::make_shared<Arguments>();
   command->add_option("--heartbeat", a->heartbeat, "shared-memory name")->capture_default_str();
+  command->add_option("--board", a->board, "wiring, TOML: the bridges to hold; see config/boards");
   command->add_option("--enable", a->enable, "value file of the bridge enable line: 1 awake, 0 asleep");
-  command->add_option("--pwm", a->pwm, "duty_cycle file of each motor's PWM channel")->required();
+  command->add_option("--pwm", a->pwm, "duty_cycle file of each motor's PWM channel, instead of --board");
   command->add_option("--period-ms", a->period_ms, "the loop's tick")
       ->capture_default_str()
-      ->check(CLI::Range(0.5, 100.0));
+      ->check(CLI::Range(0.5, 1000.0));
   command->add_option("--silent-ticks", a->silent_ticks, "ticks without a beat until the motors stop")
       ->capture_default_str()
       ->check(CLI::Range(1, 100));
   command->add_option("--priority", a->priority, "SCHED_FIFO priority, above the loop's; 0: none")
       ->capture_default_str()
       ->check(CLI::Range(0, 99));
+  command->add_option("--parent", a->parent,
+                      "end with this process, whose child this is (run starts its own)");
   command->callback([=] { *status = run(*a); });
 }
 

@@ -1,6 +1,6 @@
 // The guard: stops the bridges when the loop's heartbeat stops. In: heartbeat page, bridges -> out: bridges
 // asleep and every PWM at zero within silent_ticks of the last beat and half a tick of polling, whatever
-// happened to the loop (SIGKILL, SIGSTOP, hang). Bridges wake only while the loop beats.
+// happened to the loop (SIGKILL, SIGSTOP, hang). Bridges wake only while the loop beats and asks for them.
 #pragma once
 
 #include <array>

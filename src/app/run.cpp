@@ -11,6 +11,7 @@
 #include "reasons.hpp"
 #include "self_test.hpp"
 #include "service_notify.hpp"
+#include "watched_flight.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -34,6 +35,7 @@ struct Arguments {
   bool arm = false;
   std::string command_key;
   std::string command_url = runtime::kDefaultTelemetryUrl;
+  WatchOptions watch;
 };
 
 /// As in sim: motors half a second after the start, motion after a second.
@@ -52,6 +54,7 @@ struct Outcome {
   std::string end;    // finished, duration, interrupted, fell, peer_gone, timeout, protocol, device, log
   std::string error;  // one line; empty when nothing went wrong
   std::string log;
+  nlohmann::json watch;  // guard, realtime, timing; null: nobody watched
 };
 
 /// run.lcm, run-2.lcm, run-3.lcm: a new engine is a new flight.
@@ -77,7 +80,9 @@ class Runner {
 
   const Calibration& calibration() const { return config_.calibration; }
 
-  Outcome fly_once(rio_t io, int number) {
+  /// `watched(f)` calls f with the loop's supervisor.
+  template <class Watched>
+  Outcome fly_once(rio_t io, int number, Watched&& watched) {
     Outcome outcome;
     outcome.log = numbered(a_.log, number);
     runtime::TelemetryOptions options;
@@ -99,7 +104,8 @@ class Runner {
         service.tick(tick);
         return receiver_ ? receiver_->latest() : script(a_, static_cast<double>(tick) * kTickS);
       };
-      return app::fly(io, pipeline, commands, limits, telemetry);
+      return watched(
+          [&](auto& supervisor) { return app::fly(io, pipeline, commands, limits, supervisor, telemetry); });
     });
     const runtime::TelemetryReport report = telemetry.finish();
     if (!report.warning.empty() && number == 1)
@@ -129,25 +135,27 @@ class Runner {
 nlohmann::json to_json(const Arguments& a, const std::string& robot, const Outcome& o, int flights,
                        const std::string& sha256) {
   const Flight& f = o.flight;
-  return {{"robot", robot},
-          {"backend", a.backend},
-          {"estimator", a.choice.estimator},
-          {"controller", a.choice.controller},
-          {"duration_s", f.duration_s()},
-          {"ticks", f.ticks},
-          {"armed", f.armed},
-          {"fell", f.fell},
-          {"fell_at_s", f.fell ? nlohmann::json(f.fell_at_s) : nlohmann::json(nullptr)},
-          {"reasons", reason_names(f.reasons)},
-          {"duty_max", f.duty_max},
-          {"saturated_fraction",
-           f.driven > 0 ? static_cast<double>(f.saturated) / static_cast<double>(f.driven) : 0.0},
-          {"flights", flights},
-          {"end", o.end},
-          {"error", o.error.empty() ? nlohmann::json(nullptr) : nlohmann::json(o.error)},
-          {"log", o.log},
-          {"config_sha256", sha256},
-          {"version", version()}};
+  nlohmann::json out{{"robot", robot},
+                     {"backend", a.backend},
+                     {"estimator", a.choice.estimator},
+                     {"controller", a.choice.controller},
+                     {"duration_s", f.duration_s()},
+                     {"ticks", f.ticks},
+                     {"armed", f.armed},
+                     {"fell", f.fell},
+                     {"fell_at_s", f.fell ? nlohmann::json(f.fell_at_s) : nlohmann::json(nullptr)},
+                     {"reasons", reason_names(f.reasons)},
+                     {"duty_max", f.duty_max},
+                     {"saturated_fraction",
+                      f.driven > 0 ? static_cast<double>(f.saturated) / static_cast<double>(f.driven) : 0.0},
+                     {"flights", flights},
+                     {"end", o.end},
+                     {"error", o.error.empty() ? nlohmann::json(nullptr) : nlohmann::json(o.error)},
+                     {"log", o.log},
+                     {"config_sha256", sha256},
+                     {"version", version()}};
+  if (!o.watch.is_null()) out.update(o.watch);
+  return out;
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -196,6 +204,10 @@ int run_lockstep(const Arguments& a) {
   Runner<Firmware> runner(a, a.set, "");
   const LockstepServer server(a.socket);
   std::fprintf(stderr, "waiting for a physics engine on %s\n", a.socket.c_str());
+  const auto nobody = [](auto&& fly) {  // an engine's time has no deadlines
+    runtime::NoSupervisor supervisor;
+    return fly(supervisor);
+  };
   Outcome last;
   int flights = 0;
   for (;;) {
@@ -209,7 +221,7 @@ int run_lockstep(const Arguments& a) {
       break;
     }
     Lockstep engine(fd, runner.calibration(), a.timeout_s);
-    last = runner.fly_once(engine.io(), ++flights);
+    last = runner.fly_once(engine.io(), ++flights, nobody);
     if (engine.end() != LockstepEnd::kRunning && engine.end() != LockstepEnd::kFinished &&
         !last.flight.fell) {
       last.end = name_of(engine.end());
@@ -225,17 +237,22 @@ template <class Firmware>
 int run_board(const Arguments& a, const Board& board, const std::string& board_toml) {
   std::vector<std::string> overrides = board.calibration;
   overrides.insert(overrides.end(), a.set.begin(), a.set.end());
+  FlightWatch watch(a.watch);  // before the receiver's thread, and before the board is opened
   Runner<Firmware> runner(a, overrides, board_toml);
   rio_t io{};
   bbb_error_t error{};
-  if (bbb_open(&board.wiring, &io, &error) < 0)
+  bbb_config_t wiring = board.wiring;
+  wiring.enable_held_elsewhere = a.watch.guard;
+  if (bbb_open(&wiring, &io, &error) < 0)
     throw std::runtime_error(a.board + ": " + error.text + " (equipoise doctor finds the cause)");
   const std::string broken = self_test(io);
   if (!broken.empty()) {
     rio_close(&io);
     throw std::runtime_error(a.board + ": self-test: " + broken);
   }
-  Outcome outcome = runner.fly_once(io, 1);
+  Outcome outcome =
+      runner.fly_once(io, 1, [&](auto&& fly) { return watch.fly(std::forward<decltype(fly)>(fly)); });
+  outcome.watch = watch.summary();
   if (outcome.end == "device")
     outcome.error = std::string("the board's tick failed: ") + std::strerror(-outcome.flight.error);
   return report(a, Firmware::kName, outcome, 1, runner.sha256());
@@ -251,6 +268,7 @@ int run(Arguments a) {
     std::filesystem::create_directories("logs");
     a.log = "logs/run-" + a.backend + ".lcm";
   }
+  a.watch.board_path = a.board;
   watch_interrupts();
   return with_robot(robot, a.config, [&](auto firmware) {
     using Firmware = decltype(firmware);
@@ -305,6 +323,23 @@ void add_run(CLI::App& app, int* status) {
       ->capture_default_str()
       ->check(CLI::Range(0, 1000000));
   command->add_option("--json", a->json, "summary as JSON, - for stdout");
+  command->add_flag("--guard,!--no-guard", a->watch.guard,
+                    "board: a process that stops the motors when this one dies or hangs (default: yes)");
+  command->add_flag("--realtime,!--without-realtime", a->watch.realtime,
+                    "board: motors only under real-time scheduling (default: yes)");
+  command->add_option("--cpu", a->watch.cpu, "board: the loop's CPU; -1: any")
+      ->capture_default_str()
+      ->check(CLI::Range(-1, 1023));
+  command
+      ->add_option("--priority", a->watch.priority,
+                   "board: the loop's SCHED_FIFO priority, below the guard's 90")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 89));
+  command
+      ->add_option("--slow-motion", a->watch.slow_motion,
+                   "emulated board: every deadline this many times as long")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 200.0));
   command->add_option("--telemetry", a->telemetry, "LCM provider URL, or off")->capture_default_str();
   command->callback([=] {
     if (arm->count() == 0) a->arm = a->backend == "lockstep";

@@ -24,10 +24,26 @@ std::int64_t watchdog_period_us() {
 
 }  // namespace
 
+void notify_service_manager(const std::string& message) {
+  const char* const name = std::getenv("NOTIFY_SOCKET");
+  if (name == nullptr || *name == '\0') return;
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::size_t length = std::strlen(name);
+  if (length >= sizeof address.sun_path) return;
+  std::memcpy(address.sun_path, name, length);
+  if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // abstract
+  const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) return;
+  (void)sendto(fd, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+               reinterpret_cast<const sockaddr*>(&address),
+               static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length));
+  close(fd);
+}
+
 ServiceNotify::ServiceNotify() : period_us_(watchdog_period_us()) {
   const char* const path = std::getenv("NOTIFY_SOCKET");
   if (path == nullptr || *path == '\0') return;
-  socket_ = path;
   thread_ = std::thread([this] { beat(); });
 }
 
@@ -35,7 +51,7 @@ ServiceNotify::~ServiceNotify() {
   if (!thread_.joinable()) return;
   done_ = true;
   thread_.join();
-  send("STOPPING=1");
+  notify_service_manager("STOPPING=1");
 }
 
 void ServiceNotify::beat() {
@@ -49,23 +65,9 @@ void ServiceNotify::beat() {
     if (!ready && waited_us < period_us_) continue;
     waited_us = 0;
     if (tick == told) continue;  // no tick since the last beat: the manager shall notice
-    send(ready ? "READY=1\nWATCHDOG=1" : "WATCHDOG=1");
+    notify_service_manager(ready ? "READY=1\nWATCHDOG=1" : "WATCHDOG=1");
     told = tick;
   }
-}
-
-void ServiceNotify::send(const std::string& message) const {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (socket_.size() >= sizeof address.sun_path) return;
-  std::memcpy(address.sun_path, socket_.data(), socket_.size());
-  if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // abstract
-  const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) return;
-  const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size());
-  (void)sendto(fd, message.data(), message.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&address),
-               length);
-  close(fd);
 }
 
 }  // namespace equipoise::app

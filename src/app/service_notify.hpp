@@ -10,6 +10,9 @@
 
 namespace equipoise::app {
 
+/// One datagram to the service manager, without waiting; nothing where there is none.
+void notify_service_manager(const std::string& message);
+
 class ServiceNotify {
  public:
   ServiceNotify();
@@ -21,9 +24,7 @@ class ServiceNotify {
 
  private:
   void beat();
-  void send(const std::string& message) const;
 
-  std::string socket_;
   std::int64_t period_us_;
   std::atomic<std::int64_t> tick_{-1};
   std::atomic<bool> done_{false};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "equipoise/runtime/monotonic.hpp"
 #include "interrupt.hpp"
 
 namespace equipoise::app {
@@ -24,6 +25,7 @@ RawSample Session::next() {
     std::int64_t now_ns = 0;
     const int status = hardware_.wait_tick(&now_ns);
     if (status != 0) throw JobError(std::string("no tick: ") + std::strerror(-status) + "; motors are off");
+    beat();
     rio_sensors_t sensors{};
     if (rio_read_sensors(&io_, &sensors) != 0) sensors.valid = 0;
     const RawSample raw = from_rio(sensors);
@@ -35,8 +37,20 @@ RawSample Session::next() {
   }
 }
 
+int Session::motors_off() noexcept {
+  if (heartbeat_ != nullptr) heartbeat_->want_enable.store(0, std::memory_order_relaxed);
+  return hardware_.motors_off();
+}
+
+void Session::beat() {
+  if (heartbeat_ == nullptr) return;
+  heartbeat_->loop.fetch_add(1, std::memory_order_release);
+  if (!guard_.alive(heartbeat_->guard.load(std::memory_order_acquire), runtime::monotonic_now_ns()))
+    throw JobError("the guard process has died; motors are off");
+}
+
 void Session::off() {
-  if (hardware_.motors_off() != 0)
+  if (motors_off() != 0)
     throw JobError("the motors cannot be switched off: take the battery out, then run equipoise doctor");
 }
 
@@ -49,12 +63,13 @@ RawSample Session::drive(const std::array<double, kMaxMotors>& duty) {
   MotorCommand command;
   command.duty = duty;
   command.enable = true;
+  if (heartbeat_ != nullptr) heartbeat_->want_enable.store(1, std::memory_order_relaxed);
   const int status = hardware_.write(command);
   try {
     if (status != 0) throw JobError(std::string("the bridges refuse: ") + std::strerror(-status));
     return next();
   } catch (...) {
-    (void)hardware_.motors_off();
+    (void)motors_off();
     throw;
   }
 }

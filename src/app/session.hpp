@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "equipoise/runtime/heartbeat.hpp"
 #include "equipoise/types.hpp"
 #include "hardware.hpp"
 
@@ -43,8 +44,12 @@ struct Stillness {
 
 class Session {
  public:
-  Session(rio_t io, Ask ask) : hardware_(io), io_(io), ask_(std::move(ask)) {}
-  ~Session() { (void)hardware_.motors_off(); }
+  static constexpr std::int64_t kGuardSilent_ns = 30'000'000;  // as the flight's supervisor
+
+  /// `heartbeat`: of the guard that holds the bridges; nullptr: nobody does.
+  Session(rio_t io, Ask ask, runtime::HeartbeatPage* heartbeat = nullptr)
+      : hardware_(io), io_(io), ask_(std::move(ask)), heartbeat_(heartbeat) {}
+  ~Session() { (void)motors_off(); }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
@@ -62,10 +67,15 @@ class Session {
 
  private:
   RawSample next();
+  int motors_off() noexcept;
+  /// Once per tick; JobError when the guard is dead.
+  void beat();
 
   Hardware hardware_;
   rio_t io_;
   Ask ask_;
+  runtime::HeartbeatPage* heartbeat_;
+  runtime::BeatWatch guard_{kGuardSilent_ns};
   double temperature_degC_ = 0.0;
 };
 

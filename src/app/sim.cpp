@@ -1,19 +1,16 @@
 #include <unistd.h>
 
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <thread>
 
 #include "commands.hpp"
 #include "equipoise/runtime/telemetry.hpp"
+#include "interrupt.hpp"
 #include "simulate.hpp"
 
 namespace equipoise::app {
 namespace {
-
-std::atomic<bool> interrupted{false};
-void on_signal(int) { interrupted.store(true); }
 
 struct Arguments {
   std::string config;
@@ -140,8 +137,7 @@ int run(Arguments a) {
   telemetry_options.run.backend = "sim";
   runtime::Telemetry telemetry(telemetry_options);
 
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  watch_interrupts();
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   Pace pace(a.realtime, a.options.duration_s, stderr);
   const SimSummary summary = simulate<Firmware>(

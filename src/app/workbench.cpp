@@ -16,6 +16,8 @@
 namespace equipoise::app {
 namespace {
 
+constexpr double kTick_ms = 1e3 * kTickS;
+
 // Tipping by a positive angle about the axis; contact of wheel i: [T] (2.3)-(2.5), opposite its azimuth.
 const char* const kTipMbbr =
     "tip the robot by about 40 degrees towards +x, which is a ninth of a turn from wheel 1 on the way to "
@@ -100,12 +102,15 @@ std::unique_ptr<Session> Workbench::open() {
     io = practice_->io();
     ask = practice_->ask();
   } else {
+    if (guard_ == nullptr) guard_ = std::make_unique<GuardProcess>(board_path_, kTick_ms);
     bbb_error_t error{};
-    if (bbb_open(&board_.wiring, &io, &error) < 0)
+    bbb_config_t wiring = board_.wiring;
+    wiring.enable_held_elsewhere = true;
+    if (bbb_open(&wiring, &io, &error) < 0)
       throw std::runtime_error(board_path_ + ": " + error.text + " (equipoise doctor --board " + board_path_ +
                                " finds the cause)");
   }
-  auto session = std::make_unique<Session>(io, std::move(ask));
+  auto session = std::make_unique<Session>(io, std::move(ask), guard_ ? &guard_->page() : nullptr);
   const std::string broken = self_test(session->io());
   if (!broken.empty()) throw std::runtime_error(board_path_ + ": self-test: " + broken);
   return session;

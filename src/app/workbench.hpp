@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "guard_process.hpp"
 #include "practice.hpp"
 #include "session.hpp"
 
@@ -46,6 +47,7 @@ class Workbench {
   PracticeSetup setup_;
   std::string tip_words_;
   std::unique_ptr<PracticeRobot> practice_;
+  std::unique_ptr<GuardProcess> guard_;  // on the board; from the first open() on
 };
 
 }  // namespace equipoise::app

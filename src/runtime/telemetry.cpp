@@ -13,9 +13,11 @@
 #include <equipoise/run_t.hpp>
 #include <equipoise/sensors_t.hpp>
 #include <equipoise/state_t.hpp>
+#include <equipoise/timing_histogram_t.hpp>
 #include <equipoise/timing_t.hpp>
 #include <stdexcept>
 
+#include "equipoise/runtime/timing.hpp"
 #include "log_writer.hpp"
 
 namespace equipoise::runtime {
@@ -24,8 +26,8 @@ namespace {
 constexpr std::size_t kQueueTicks = 1024;  // five seconds at 200 Hz
 constexpr auto kIdle = std::chrono::milliseconds(2);
 
-template <std::size_t N>
-void copy(const std::array<double, N>& from, double (&to)[N]) {
+template <class T, std::size_t N>
+void copy(const std::array<T, N>& from, T (&to)[N]) {
   std::copy(from.begin(), from.end(), to);
 }
 
@@ -213,6 +215,20 @@ class Telemetry::Writer {
     m.overruns = r.overruns;
     m.dropped_records = r.dropped_records;
     emit("EQUIPOISE_TIMING", m);
+    if (r.compute_ns > 0) histogram(r);  // simulated time takes no time
+  }
+
+  /// Once a second of ticks.
+  void histogram(const TickRecord& r) {
+    wake_late_.add(r.wake_late_ns);
+    compute_.add(r.compute_ns);
+    if (wake_late_.total() % static_cast<std::int64_t>(kTickHz) != 0) return;
+    timing_histogram_t m{};
+    for (std::size_t i = 0; i < TimeHistogram::kBins; ++i) m.upper_ns[i] = TimeHistogram::upper_ns(i);
+    copy(wake_late_.bins(), m.wake_late);
+    copy(compute_.bins(), m.compute);
+    publish_now_ = lcm_ != nullptr;
+    emit("EQUIPOISE_TIMING_HISTOGRAM", m);
   }
 
   const TelemetryOptions& options_;
@@ -226,6 +242,8 @@ class Telemetry::Writer {
   bool publish_now_ = false;
   std::int64_t utime_ = 0;
   std::int64_t tick_ = 0;
+  TimeHistogram wake_late_;
+  TimeHistogram compute_;
 };
 
 Telemetry::Telemetry(const TelemetryOptions& options)

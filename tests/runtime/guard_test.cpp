@@ -31,12 +31,12 @@ class GuardProcess : public ::testing::Test {
     for (const char* name : {"enable", "pwm0", "pwm1", "pwm2"}) std::ofstream(dir_ / name) << "0\n";
     name_ = "/equipoise-test-" + std::to_string(getpid());
     guard_ = fork();
-    if (guard_ == 0) {
-      execl(EQUIPOISE_BINARY, "equipoise", "guard", "--heartbeat", name_.c_str(), "--enable",
-            (dir_ / "enable").c_str(), "--pwm", (dir_ / "pwm0").c_str(), (dir_ / "pwm1").c_str(),
-            (dir_ / "pwm2").c_str(), nullptr);
-      _exit(127);
-    }
+    if (guard_ == 0) exec_guard("0");
+    connect();
+    ASSERT_NE(page_, nullptr) << "the guard did not start";
+  }
+
+  void connect() {
     for (int i = 0; i < 1000 && page_ == nullptr; ++i) {
       try {
         page_ = std::make_unique<runtime::SharedHeartbeat>(name_, runtime::SharedHeartbeat::Role::kLoop);
@@ -44,15 +44,33 @@ class GuardProcess : public ::testing::Test {
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
       }
     }
-    ASSERT_NE(page_, nullptr) << "the guard did not start";
+  }
+
+  /// As ps shows it: R, S, Z, ...; '?' when there is none.
+  static char state_of(pid_t pid) {
+    std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+    std::string id;
+    std::string name;
+    char state = '?';
+    stat >> id >> name >> state;
+    return state;
   }
 
   void TearDown() override {
     end(loop_);
+    end(robot_);
     end(guard_);
     shm_unlink(name_.c_str());  // a killed guard leaves its page
     page_.reset();
     std::filesystem::remove_all(dir_);
+  }
+
+  /// `parent`: whose end is its own; 0: nobody's.
+  [[noreturn]] void exec_guard(const char* parent) const {
+    execl(EQUIPOISE_BINARY, "equipoise", "guard", "--heartbeat", name_.c_str(), "--parent", parent,
+          "--enable", (dir_ / "enable").c_str(), "--pwm", (dir_ / "pwm0").c_str(), (dir_ / "pwm1").c_str(),
+          (dir_ / "pwm2").c_str(), nullptr);
+    _exit(127);
   }
 
   static void end(pid_t& pid) {
@@ -69,13 +87,13 @@ class GuardProcess : public ::testing::Test {
     loop_ = fork();
     if (loop_ != 0) return;
     std::int64_t due_ns = runtime::monotonic_now_ns();
+    page_->page().want_enable.store(1);
     for (int tick = 0;; ++tick) {
       if (tick == hang_after) pause();  // as in a read that never comes back: the lost interrupt
       for (const char* name : {"pwm0", "pwm1", "pwm2"}) std::ofstream(dir_ / name, std::ios::in) << "25000\n";
       page_->page().loop.fetch_add(1);
       due_ns += kTick_ns;
-      const timespec at{due_ns / 1'000'000'000, due_ns % 1'000'000'000};
-      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+      runtime::sleep_until(due_ns);
     }
   }
 
@@ -131,12 +149,49 @@ class GuardProcess : public ::testing::Test {
   std::unique_ptr<runtime::SharedHeartbeat> page_;
   pid_t guard_ = 0;
   pid_t loop_ = 0;
+  pid_t robot_ = 0;  // whose child is a guard
 };
 
 TEST_F(GuardProcess, BridgesSleepUntilTheLoopBeats) {
   EXPECT_TRUE(off());
   start_loop();
   EXPECT_TRUE(wait_for(true));
+}
+
+TEST_F(GuardProcess, BridgesSleepWhenTheLoopDoesNotDrive) {
+  start_loop();
+  ASSERT_TRUE(wait_for(true));
+  page_->page().want_enable.store(0);
+  EXPECT_TRUE(wait_for(false));
+  EXPECT_EQ(page_->page().cut.load(), 0U);  // not late: nothing to disarm for
+}
+
+TEST_F(GuardProcess, EndsWithTheProcessThatStartedIt) {
+  end(guard_);
+  shm_unlink(name_.c_str());  // of the one just killed
+  int to_parent[2];
+  ASSERT_EQ(pipe(to_parent), 0);
+  robot_ = fork();
+  if (robot_ == 0) {
+    const pid_t guard = fork();
+    if (guard == 0) exec_guard(std::to_string(getppid()).c_str());
+    (void)!write(to_parent[1], &guard, sizeof guard);
+    pause();
+  }
+  pid_t guard = 0;
+  ASSERT_EQ(read(to_parent[0], &guard, sizeof guard), static_cast<ssize_t>(sizeof guard));
+  page_.reset();
+  connect();
+  while (page_->page().guard.load() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  start_loop();
+  ASSERT_TRUE(wait_for(true));
+  end(robot_);
+  EXPECT_TRUE(wait_for(false));  // although somebody beats
+  for (int i = 0; i < 1000 && kill(guard, 0) == 0 && state_of(guard) != 'Z'; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_TRUE(kill(guard, 0) != 0 || state_of(guard) == 'Z');  // an orphan may wait for somebody to reap it
+  close(to_parent[0]);
+  close(to_parent[1]);
 }
 
 TEST_F(GuardProcess, StopsTheMotorsOfAKilledLoop) {
@@ -184,7 +239,7 @@ TEST(SupervisorTest, ADeadGuardForbidsMotors) {
     raw.t_ns = now;
     if (guard_lives) page.guard.fetch_add(2);
     const std::uint32_t reasons = supervisor.begin(now, raw);
-    supervisor.end(0);
+    supervisor.end(true, 0);
     return reasons;
   };
   EXPECT_EQ(tick(false), kGuardDead);  // never seen
@@ -204,7 +259,7 @@ TEST(SupervisorTest, AFailedWriteForbidsMotors) {
   RawSample raw;
   raw.t_ns = kTick_ns;
   EXPECT_EQ(supervisor.begin(kTick_ns, raw), kRealtimeMissing);
-  supervisor.end(-EIO);
+  supervisor.end(false, -EIO);
   raw.t_ns = 2 * kTick_ns;
   EXPECT_EQ(supervisor.begin(2 * kTick_ns, raw), kRealtimeMissing | kWriteFailed);
 }

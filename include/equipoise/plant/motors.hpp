@@ -3,6 +3,8 @@
 // switches carry no current. Simulation only; no allocation.
 #pragma once
 
+#include <array>
+
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/plant/diode_drop.hpp"
 #include "equipoise/plant/world.hpp"
@@ -21,7 +23,11 @@ class SimulatedMotors {
         diode_drop_V_(world.diode_drop_V),
         battery_V_(world.battery_V) {}
 
-  void command(const MotorCommand& command) noexcept { command_ = command; }
+  void command(const MotorCommand& command) noexcept {
+    command_ = command;
+    for (std::size_t i = 0; i < std::size_t{N}; ++i)
+      held_[i] = DriveCoastCommand(motor_.T_r(), calibration_.motor_sign[i] * command.duty[i]);
+  }
   bool enabled() const noexcept { return command_.enable; }
   double battery_V() const noexcept { return battery_V_; }
 
@@ -32,9 +38,8 @@ class SimulatedMotors {
     const double no_load = motor_.no_load_rad_s(battery_V_);
     for (int i = 0; i < N; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      const double duty = calibration_.motor_sign[k] * command_.duty[k];
       const double omega_r = wheel_rate_rad_s(i) / no_load;
-      torque(i) = stall_torque * current_over_stall(omega_r, duty);
+      torque(i) = stall_torque * current_over_stall(k, omega_r);
     }
     return torque;
   }
@@ -53,9 +58,10 @@ class SimulatedMotors {
   }
 
  private:
-  double current_over_stall(double omega_r, double duty) const noexcept {
+  double current_over_stall(std::size_t k, double omega_r) const noexcept {
+    const double duty = calibration_.motor_sign[k] * command_.duty[k];
     if (motor_.bridge == BridgeType::kDriveBrake) return duty - omega_r;
-    if (diode_drop_V_ == 0.0) return drive_coast_mean_current(motor_.T_r(), omega_r, duty);
+    if (diode_drop_V_ == 0.0) return held_[k].mean_current(omega_r);
     const double opposing = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
     return drive_coast_mean_current_with_drop(motor_.T_r(), omega_r, duty, opposing);
   }
@@ -67,6 +73,7 @@ class SimulatedMotors {
   double diode_drop_V_;
   double battery_V_;
   MotorCommand command_;
+  std::array<DriveCoastCommand, N> held_{};  // the integrator asks at many speeds per command
 };
 
 }  // namespace equipoise

@@ -15,7 +15,7 @@ struct HeartbeatPage {
   std::atomic<std::uint32_t> loop;         // counted up by the loop, once per tick
   std::atomic<std::uint32_t> guard;        // counted up by the guard, once per poll
   std::atomic<std::uint32_t> cut;          // times the guard has stopped the motors
-  std::atomic<std::uint32_t> want_enable;  // 1: the loop drives, so the guard keeps the bridges awake
+  std::atomic<std::uint32_t> want_enable;  // 1: the loop drives; the guard keeps the bridges awake
 };
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "shared between processes");
 

@@ -20,8 +20,8 @@ struct LoopEnd {
 struct NoSupervisor {
   /// SafetyReason bits that forbid motors in this tick.
   std::uint32_t begin(std::int64_t /*now_ns*/, const RawSample& /*raw*/) noexcept { return 0; }
-  /// `write_error`: what writing the motors returned.
-  void end(int /*write_error*/) noexcept {}
+  /// `driven`: motors are to run; `write_error`: what writing them returned.
+  void end(bool /*driven*/, int /*write_error*/) noexcept {}
 };
 
 template <class Io, class Pipeline, class Commands, class Observer, class Supervisor>
@@ -36,7 +36,7 @@ LoopEnd run_loop(Io& io, Pipeline& pipeline, Commands&& commands, Observer&& obs
     const std::uint32_t inhibit = supervisor.begin(now_ns, raw);
     const Command command = commands(end.ticks, now_ns);
     const auto result = pipeline.tick(raw, command, inhibit);
-    supervisor.end(io.write(result.motors));
+    supervisor.end(result.motors.enable, io.write(result.motors));
     observe(end.ticks, now_ns, raw, command, result);
     ++end.ticks;
   }

@@ -27,8 +27,7 @@ inline constexpr std::array<const char*, kRealtimeItems> kRealtimeItemNames{
 inline constexpr std::array<const char*, kRealtimeItems> kRealtimeRemedies{
     "run as a service with LimitRTPRIO=99, or: setcap cap_sys_nice+ep, or ulimit -r 99",
     "LimitMEMLOCK=infinity, or: setcap cap_ipc_lock+ep, or ulimit -l unlimited", "ulimit -s 8192 or more",
-    "name a CPU that exists in runtime.cpu",
-    "a group that may write /dev/cpu_dma_latency (see the udev rule)"};
+    "name a CPU that exists with --cpu", "a group that may write /dev/cpu_dma_latency (see the udev rule)"};
 
 struct RealtimeResult {
   bool wanted = false;

@@ -3,20 +3,13 @@
 // tick: a loop that hangs anywhere stops beating. RT-safe; the clock read is a vDSO call.
 #pragma once
 
-#include <time.h>
-
 #include "equipoise/actuate/safety_reasons.hpp"
 #include "equipoise/runtime/heartbeat.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 #include "equipoise/runtime/timing.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise::runtime {
-
-inline std::int64_t monotonic_now_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
-}
 
 class Supervisor {
  public:
@@ -40,9 +33,13 @@ class Supervisor {
     return reasons;
   }
 
-  void end(int write_error) noexcept {
+  /// `driven`: this tick's command has the bridges awake; `write_error`: what writing it returned.
+  void end(bool driven, int write_error) noexcept {
     write_error_ = write_error;
-    if (page_ != nullptr) page_->loop.fetch_add(1, std::memory_order_release);
+    if (page_ != nullptr) {
+      page_->want_enable.store(driven ? 1 : 0, std::memory_order_relaxed);
+      page_->loop.fetch_add(1, std::memory_order_release);
+    }
     timing_.end(monotonic_now_ns());
   }
 

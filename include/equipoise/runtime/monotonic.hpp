@@ -1,0 +1,24 @@
+// CLOCK_MONOTONIC as nanoseconds, the loop clock of hardware. RT-safe: a vDSO call; a sleep.
+#pragma once
+
+#include <time.h>
+
+#include <cstdint>
+
+namespace equipoise::runtime {
+
+inline std::int64_t monotonic_now_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
+}
+
+/// Returns early when a signal comes.
+inline void sleep_until(std::int64_t at_ns) noexcept {
+  timespec at{};
+  at.tv_sec = static_cast<time_t>(at_ns / 1'000'000'000);
+  at.tv_nsec = static_cast<long>(at_ns % 1'000'000'000);
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+}
+
+}  // namespace equipoise::runtime

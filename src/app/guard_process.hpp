@@ -1,0 +1,32 @@
+// The guard of one flight: a child process that holds the bridge enables of a board and its heartbeat page.
+// In: board file, tick -> out: the page to beat on; runtime_error when it does not come up. It ends with this
+// process, whatever ends that. Start-up only; create it before threads, and before the board is opened.
+#pragma once
+
+#include <sys/types.h>
+
+#include <memory>
+#include <string>
+
+#include "equipoise/runtime/heartbeat.hpp"
+
+namespace equipoise::app {
+
+class GuardProcess {
+ public:
+  GuardProcess(const std::string& board_path, double tick_ms);
+  ~GuardProcess();  // tells it to switch off and waits for that
+  GuardProcess(const GuardProcess&) = delete;
+  GuardProcess& operator=(const GuardProcess&) = delete;
+
+  runtime::HeartbeatPage& page() noexcept { return page_->page(); }
+
+ private:
+  bool ended(int* status);
+  void stop();
+
+  pid_t pid_ = 0;
+  std::unique_ptr<runtime::SharedHeartbeat> page_;
+};
+
+}  // namespace equipoise::app
