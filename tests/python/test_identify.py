@@ -1,4 +1,4 @@
-"""equipoise identify: parameters out of bench logs, fragments that a configuration includes, clear refusals."""
+"""equipoise identify: parameters out of bench logs, fragments for a configuration, clear refusals."""
 
 import json
 import subprocess

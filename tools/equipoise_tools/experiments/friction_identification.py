@@ -57,9 +57,7 @@ def run(out_dir: Path) -> Result:
     excess = stribeck["estimates"]["stribeck_excess_N_m"]
     result.add("Fig. 5.3", "Stribeck excess, 80 % put in", excess["value"], None, "N m")
     result.check("Fig. 5.3", "stiction is found where it is", excess["determined"])
-    sides = [
-        sided["estimates"][f"coulomb_friction_{side}_N_m"]["value"] for side in ("positive", "negative")
-    ]
+    sides = [sided["estimates"][f"coulomb_friction_{side}_N_m"]["value"] for side in ("positive", "negative")]
     result.add("Fig. 5.3", "friction backwards over forwards, 1.3 put in", sides[1] / sides[0])
     result.check("Fig. 5.3", "directions are told apart", abs(sides[1] / sides[0] - 1.3) < 0.05)
     draw(out_dir / "friction_identification.png", bench, estimates)
