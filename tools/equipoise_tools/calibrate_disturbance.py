@@ -1,8 +1,8 @@
 """python -m equipoise_tools.calibrate_disturbance [--evaluations N] [--seed N] [--out FILE]
 
 Finds the magnitudes of the simulated disturbances with which the printed EKF, with the noise of [T] (6.28),
-makes the errors of [T] Table 6.1. Its estimates also control, as in [T], but through the scheduled gains: with (6.29)
-the robot falls. Evolution strategy with a learned covariance; the misfit is how far each of the fourteen
+makes the errors of [T] Table 6.1. Its estimates also control, as in [T], but through the scheduled gains;
+with (6.29) the robot falls. Evolution strategy with a learned covariance; the misfit is how far each of the fourteen
 errors lies outside +-20 %.
 """
 
