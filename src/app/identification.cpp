@@ -11,6 +11,7 @@ using Eigen::Index;
 
 constexpr std::size_t kMinSamples = 200;
 constexpr double kMoving_rad_s = 0.5;
+constexpr double kCreeping_rad_s = 0.1;
 constexpr double kStribeck_rad_s = 1.0;
 
 double sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
@@ -66,7 +67,9 @@ LeastSquares electrical_fit(const BenchLog& log) {
     const double time = log.rows[last].t_s - log.rows[first - 1].t_s;
     const double di = 0.5 * (log.rows[last + 1].current_A + log.rows[last].current_A -
                              log.rows[first].current_A - log.rows[first - 1].current_A);
-    A.row(j) << current / count, (log.rows[last].angle_rad - log.rows[first - 1].angle_rad) / time, di / time;
+    A(j, 0) = current / count;
+    A(j, 1) = (log.rows[last].angle_rad - log.rows[first - 1].angle_rad) / time;
+    A(j, 2) = di / time;
     b(j) = voltage / count;
   }
   return least_squares(A, b);
@@ -188,10 +191,12 @@ Eigen::MatrixXd friction_regressors(const std::vector<Window>& windows, const Fr
 /// explained. This turns the coefficients, which come divided by the inertia, into inertia and torques.
 void undo_division_by_inertia(LeastSquares* fit) {
   const double inverse = fit->x(0);
-  fit->half_width /= std::abs(inverse);
-  fit->half_width(0) /= std::abs(inverse);
-  fit->x /= inverse;
+  for (Index i = 1; i < fit->x.size(); ++i) {
+    fit->x(i) /= inverse;
+    fit->half_width(i) /= std::abs(inverse);
+  }
   fit->x(0) = 1.0 / inverse;
+  fit->half_width(0) /= inverse * inverse;
 }
 
 }  // namespace
@@ -232,7 +237,8 @@ Identified identify_friction(const BenchLog& log, const FrictionRig& rig) {
   Identified out;
   out.refused = unusable(log, false);
   if (!out.refused.empty()) return out;
-  const std::vector<Window> windows = windows_in_motion(log, kMoving_rad_s / rig.flywheel_over_ball_radius);
+  const double least = rig.stribeck ? kCreeping_rad_s : kMoving_rad_s;  // of the ball
+  const std::vector<Window> windows = windows_in_motion(log, least / rig.flywheel_over_ball_radius);
   if (windows.size() < kMinSamples) {
     out.refused = "the flywheel hardly moves: " + std::to_string(windows.size()) +
                   " usable samples; drive it with a larger or longer sweep";
