@@ -2,8 +2,8 @@
 
 Finds the magnitudes of the simulated disturbances with which the printed EKF, with the noise of [T] (6.28),
 makes the errors of [T] Table 6.1. Its estimates also control, as in [T], but through the scheduled gains;
-with (6.29) the robot falls. Evolution strategy with a learned covariance; the misfit is how far each of the fourteen
-errors lies outside +-20 %.
+with (6.29) the robot falls. Evolution strategy with a learned covariance; the misfit is how far each of the
+fourteen errors lies outside +-20 %.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ TABLE_6_1 = (
     (1.0, 0.05, 0.077, 0.21),
 )
 WITHIN = 1.20
+DURATION_S = 15.0
 FALLEN = 10.0
 D = "world.full.disturbance."
 # Key -> (low, high, start); [T] knows of each effect and gives a magnitude for the torque imbalance only.
@@ -177,7 +178,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--evaluations", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--duration-s", type=float, default=20.0)
+    parser.add_argument("--duration-s", type=float, default=DURATION_S)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument(
         "--out", type=Path, default=repository_root() / "config" / "fragments" / "table_6_1.toml"
