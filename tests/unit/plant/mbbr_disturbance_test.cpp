@@ -104,6 +104,7 @@ TEST(MbbrDisturbance, ExtraFrictionSlowsTheSpin) {
 
 TEST(MbbrDisturbance, TorqueImbalanceTurnsTheRobotAside) {
   MbbrWorldParams w = quiet();
+  w.common.friction = false;
   EXPECT_LT(World(w).run(kSpin, 10).truth().phi.norm(), 1e-9);  // equal motors only spin
   w.drive.wheel_torque_scale = Vec3(1.0575, 0.9425, 1.0);       // 11.5 %, [T] section 5.3
   EXPECT_GT(World(w).run(kSpin, 10).truth().phi.norm(), 1e-4);
@@ -135,6 +136,7 @@ TEST(MbbrDisturbance, DiodeDropMatchesTheSwitchingMotor) {
 
 TEST(MbbrDisturbance, DiodeDropTakesTorqueFromPartialDuty) {
   MbbrWorldParams w = quiet();
+  w.common.friction = false;
   const double plain = std::abs(World(w).run({0.5, 0.5, 0.5}, 20).truth().theta_z);
   w.common.diode_drop_V = 0.7;
   EXPECT_LT(std::abs(World(w).run({0.5, 0.5, 0.5}, 20).truth().theta_z), 0.98 * plain);
