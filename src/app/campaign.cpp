@@ -6,6 +6,7 @@
 
 #include "commands.hpp"
 #include "fault_flight.hpp"
+#include "reasons.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -27,13 +28,6 @@ struct Soak {
   std::int64_t unsafe = 0;
   nlohmann::json to_explain = nlohmann::json::array();  // flights that are unsafe or fell without a fault
 };
-
-std::string names_of(std::uint32_t reasons) {
-  std::string text;
-  for_each_reason(reasons,
-                  [&text](const char* name) { text += (text.empty() ? "" : ", ") + std::string(name); });
-  return text;
-}
 
 template <class Firmware>
 Verdict one(const typename Firmware::Config& config, const FlightPlan& plan, std::uint64_t seed) {
@@ -84,7 +78,7 @@ Soak soak(const typename Firmware::Config& config, double hours, std::uint64_t s
                               {"fault_ticks", plan.fault_ticks},
                               {"seed", flight_seed},
                               {"off_after_ticks", v.off_after_ticks},
-                              {"reasons", names_of(v.reasons)},
+                              {"reasons", reasons_text(v.reasons)},
                               {"why", v.why}});
     }
   }
@@ -124,11 +118,12 @@ int campaign(const Arguments& a) {
              {"why", v.why},
              {"disarmed", v.disarmed},
              {"off_after_ticks", v.disarmed ? nlohmann::json(v.off_after_ticks) : nlohmann::json(nullptr)},
-             {"reasons", names_of(v.reasons)}});
+             {"reasons", reasons_text(v.reasons)}});
         if (i > 0 && !v.unsafe) continue;
-        cell = v.unsafe     ? "**UNSAFE: " + std::string(v.why) + "**"
-               : v.disarmed ? "off in tick " + std::to_string(v.off_after_ticks) + ": " + names_of(v.reasons)
-               : v.reasons != 0 ? "stays off: " + names_of(v.reasons)
+        cell = v.unsafe ? "**UNSAFE: " + std::string(v.why) + "**"
+               : v.disarmed
+                   ? "off in tick " + std::to_string(v.off_after_ticks) + ": " + reasons_text(v.reasons)
+               : v.reasons != 0 ? "stays off: " + reasons_text(v.reasons)
                                 : "flies on";
       }
       table += cell + " | ";

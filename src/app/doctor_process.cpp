@@ -63,9 +63,8 @@ void examine_limit(const Patient& patient, Findings* findings, const std::string
 }
 
 void examine_limits(const Patient& patient, Findings* findings) {
-  const std::int64_t priority = runtime::RealtimeWish{}.priority + 1;  // the guard is one above the loop
-  examine_limit(patient, findings, "limits.rtprio", "Max realtime priority", priority, kCapSysNice,
-                "@equipoise - rtprio 99");
+  examine_limit(patient, findings, "limits.rtprio", "Max realtime priority", runtime::kGuardPriority,
+                kCapSysNice, "@equipoise - rtprio 99");
   constexpr std::int64_t kLocked_bytes = 256 << 20;  // code, stacks and the log queue, generously
   examine_limit(patient, findings, "limits.memlock", "Max locked memory", kLocked_bytes, kCapIpcLock,
                 "@equipoise - memlock unlimited");

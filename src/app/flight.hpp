@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "announcer.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"
 #include "firmware.hpp"
@@ -36,9 +37,10 @@ struct FlightLimits {
 inline runtime::TickTiming timing_of(const runtime::Supervisor& s) noexcept { return s.timing().now(); }
 inline runtime::TickTiming timing_of(const runtime::NoSupervisor&) noexcept { return {}; }
 
+/// `announcer` may be nullptr.
 template <class Pipeline, class Commands, class Supervisor>
 Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits& limits,
-           Supervisor& supervisor, runtime::Telemetry& telemetry) {
+           Supervisor& supervisor, runtime::Telemetry& telemetry, Announcer* announcer) {
   Hardware hardware(io);
   Flight flight;
   runtime::TickRecord record{};
@@ -65,6 +67,7 @@ Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits
     record.overruns = timing.overruns;
     record.dropped_records = telemetry.dropped();
     telemetry.hand_over(record);
+    if (announcer != nullptr) announcer->tell(t.arm_state, t.reasons, t.z.battery_V);
     // Nothing flies unrecorded.
     if (tick >= last_tick || (flight.fell && limits.end_on_fall) || telemetry.log_failed()) done = true;
     if (interrupted.load(std::memory_order_relaxed)) done = true;

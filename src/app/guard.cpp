@@ -69,7 +69,7 @@ struct Arguments {
   std::vector<std::string> pwm;
   double period_ms = 5.0;
   int silent_ticks = 2;
-  int priority = 90;
+  int priority = runtime::kGuardPriority;
   int parent = 0;
 };
 

@@ -1,23 +1,24 @@
-// Why the motors are off, in words: bits of SafetyReason -> machine-readable names. docs/safety.md
+// Why the motors are off, in words. In: bits of SafetyReason -> out: their names.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
-#include "equipoise/actuate/safety.hpp"
+#include "equipoise/actuate/safety_reasons.hpp"
 
 namespace equipoise::app {
 
 inline std::vector<std::string> reason_names(std::uint32_t reasons) {
-  static constexpr std::array<const char*, 8> kNames{"not_requested",  "tilt",       "imu_stale",
-                                                     "encoder_stale",  "not_finite", "battery_low",
-                                                     "attitude_stale", "gyro_moving"};
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
-    if ((reasons & (1U << i)) != 0) names.emplace_back(kNames[i]);
-  }
+  for_each_reason(reasons, [&names](const char* name) { names.emplace_back(name); });
   return names;
+}
+
+/// "tilt, imu_stale"
+inline std::string reasons_text(std::uint32_t reasons) {
+  std::string text;
+  for (const std::string& name : reason_names(reasons)) text += (text.empty() ? "" : ", ") + name;
+  return text;
 }
 
 }  // namespace equipoise::app

@@ -12,6 +12,7 @@
 #include "self_test.hpp"
 #include "service_notify.hpp"
 #include "watched_flight.hpp"
+#include "wires.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -74,7 +75,9 @@ class Runner {
         config_(Firmware::apply(loaded_.config, a.choice)),
         board_toml_(board_toml) {
     if (!a.command_key.empty()) {
-      receiver_ = std::make_unique<runtime::CommandReceiver>(load_key(a.command_key), a.command_url);
+      const runtime::CommandKey key = load_key(a.command_key);
+      receiver_ = std::make_unique<runtime::CommandReceiver>(
+          key, open_wire(a.command_url, runtime::WireSide::kRobot));
     }
   }
 
@@ -82,7 +85,7 @@ class Runner {
 
   /// `watched(f)` calls f with the loop's supervisor.
   template <class Watched>
-  Outcome fly_once(rio_t io, int number, Watched&& watched) {
+  Outcome fly_once(rio_t io, int number, Announcer* announcer, Watched&& watched) {
     Outcome outcome;
     outcome.log = numbered(a_.log, number);
     runtime::TelemetryOptions options;
@@ -104,8 +107,9 @@ class Runner {
         service.tick(tick);
         return receiver_ ? receiver_->latest() : script(a_, static_cast<double>(tick) * kTickS);
       };
-      return watched(
-          [&](auto& supervisor) { return app::fly(io, pipeline, commands, limits, supervisor, telemetry); });
+      return watched([&](auto& supervisor) {
+        return app::fly(io, pipeline, commands, limits, supervisor, telemetry, announcer);
+      });
     });
     const runtime::TelemetryReport report = telemetry.finish();
     if (!report.warning.empty() && number == 1)
@@ -158,19 +162,12 @@ nlohmann::json to_json(const Arguments& a, const std::string& robot, const Outco
   return out;
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 int report(const Arguments& a, const std::string& robot, Outcome o, int flights, const std::string& sha256) {
   const Flight& f = o.flight;
   if (o.error.empty() && f.fell)
-    o.error =
-        "the motors went off at " + std::to_string(f.fell_at_s) + " s: " + joined(reason_names(f.reasons));
+    o.error = "the motors went off at " + std::to_string(f.fell_at_s) + " s: " + reasons_text(f.reasons);
   if (o.error.empty() && a.arm && a.command_key.empty() && !f.armed && f.duration_s() > 0.6)
-    o.error = "the robot never armed: " + joined(reason_names(f.reasons));
+    o.error = "the robot never armed: " + reasons_text(f.reasons);
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   std::fprintf(out, "%s after %.1f s  (%s, %s, %s)\n",
                f.fell    ? "FELL"
@@ -221,7 +218,7 @@ int run_lockstep(const Arguments& a) {
       break;
     }
     Lockstep engine(fd, runner.calibration(), a.timeout_s);
-    last = runner.fly_once(engine.io(), ++flights, nobody);
+    last = runner.fly_once(engine.io(), ++flights, nullptr, nobody);
     if (engine.end() != LockstepEnd::kRunning && engine.end() != LockstepEnd::kFinished &&
         !last.flight.fell) {
       last.end = name_of(engine.end());
@@ -250,8 +247,9 @@ int run_board(const Arguments& a, const Board& board, const std::string& board_t
     rio_close(&io);
     throw std::runtime_error(a.board + ": self-test: " + broken);
   }
-  Outcome outcome =
-      runner.fly_once(io, 1, [&](auto&& fly) { return watch.fly(std::forward<decltype(fly)>(fly)); });
+  Announcer announcer(board);
+  Outcome outcome = runner.fly_once(io, 1, &announcer,
+                                    [&](auto&& fly) { return watch.fly(std::forward<decltype(fly)>(fly)); });
   outcome.watch = watch.summary();
   if (outcome.end == "device")
     outcome.error = std::string("the board's tick failed: ") + std::strerror(-outcome.flight.error);
@@ -282,6 +280,9 @@ int run(Arguments a) {
       throw InputError(a.board + ": board.robot: \"" + board.robot + "\" where " + a.config + " says \"" +
                        Firmware::kName + "\"");
     }
+    if (a.command_url == "serial")
+      a.command_url = "serial:" + board.serial_device + ":" + std::to_string(board.serial_baud);
+    if (a.command_url == "can") a.command_url = "can:" + board.can_interface;
     return run_board<Firmware>(a, board, read_text(a.board));
   });
 }
@@ -309,7 +310,10 @@ void add_run(CLI::App& app, int* status) {
                                 "request the motors 0.5 s after the start (default: lockstep only)");
   command->add_option("--command-key", a->command_key,
                       "take commands of holders of this key (keygen, send) instead of the script");
-  command->add_option("--command-url", a->command_url, "LCM provider URL to listen on with --command-key")
+  command
+      ->add_option("--command-url", a->command_url,
+                   std::string("where to listen with --command-key: ") + kWireHelp +
+                       "; on a board also serial or can, as its file says")
       ->capture_default_str();
   command->add_option("--estimator", a->choice.estimator, "who controls (default: the robot's)");
   command->add_option("--controller", a->choice.controller, "state feedback (default: the robot's)");
@@ -332,9 +336,9 @@ void add_run(CLI::App& app, int* status) {
       ->check(CLI::Range(-1, 1023));
   command
       ->add_option("--priority", a->watch.priority,
-                   "board: the loop's SCHED_FIFO priority, below the guard's 90")
+                   "board: the loop's SCHED_FIFO priority, below the guard's")
       ->capture_default_str()
-      ->check(CLI::Range(1, 89));
+      ->check(CLI::Range(1, runtime::kGuardPriority - 1));
   command
       ->add_option("--slow-motion", a->watch.slow_motion,
                    "emulated board: every deadline this many times as long")

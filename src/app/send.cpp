@@ -2,20 +2,19 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <lcm/lcm-cpp.hpp>
 #include <optional>
 
 #include "commands.hpp"
-#include "equipoise/runtime/command_receiver.hpp"
+#include "equipoise/runtime/command_auth.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 #include "interrupt.hpp"
 #include "key_file.hpp"
+#include "wires.hpp"
 
 namespace equipoise::app {
 namespace {
 
 using runtime::CommandKey;
-using runtime::CommandReceiver;
 using Clock = std::chrono::steady_clock;
 
 struct Arguments {
@@ -30,28 +29,28 @@ struct Arguments {
   bool heading_reset = false;
 };
 
-/// What the robot says about itself.
+/// The robot at the other end of the wire.
 class Robot {
  public:
-  explicit Robot(const std::string& url) : lcm_(url) {
-    if (!lcm_.good())
-      throw InputError("--url " + url + ": cannot be opened (is there a route for multicast?)");
-    lcm_.subscribeFunction(
-        CommandReceiver::kSessionChannel,
-        +[](const lcm::ReceiveBuffer* buffer, const std::string&, Robot* self) {
-          command_session_t heard;
-          const auto size = static_cast<int>(buffer->data_size);
-          if (heard.decode(buffer->data, 0, size) == size) self->session_ = heard;
-        },
-        this);
-  }
+  explicit Robot(const std::string& url) : wire_(open_wire(url, runtime::WireSide::kOwner)) {}
 
-  void listen(int milliseconds) { lcm_.handleTimeout(milliseconds); }
+  void listen(int milliseconds) {
+    wire_->listen(milliseconds, [this](const std::uint8_t* data, std::size_t size) {
+      command_session_t heard;
+      const auto length = static_cast<int>(size);
+      if (heard.decode(data, 0, length) == length) session_ = heard;
+    });
+  }
   const std::optional<command_session_t>& session() const { return session_; }
-  void send(const signed_command_t& message) { lcm_.publish(CommandReceiver::kCommandChannel, &message); }
+  void send(const signed_command_t& message) {
+    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    wire_->say(bytes.data(), bytes.size());
+  }
+  double interval_s() const { return wire_->interval_s(); }
 
  private:
-  lcm::LCM lcm_;
+  std::unique_ptr<runtime::CommandWire> wire_;
   std::optional<command_session_t> session_;
 };
 
@@ -85,7 +84,7 @@ int send(const Arguments& a) {
     robot.send(m);
     m.heading_reset = 0;
     ++sent;
-    for (const auto next = after(0.05); Clock::now() < next;) robot.listen(10);
+    for (const auto next = after(robot.interval_s()); Clock::now() < next;) robot.listen(10);
   } while (Clock::now() < end && !interrupted.load());
   for (const auto limit = after(a.timeout_s); robot.session()->last_sequence < m.sequence;) {
     if (Clock::now() > limit)
@@ -114,7 +113,7 @@ void add_send(CLI::App& app, int* status) {
   auto* command = app.add_subcommand("send", "Commands a robot that runs with --command-key");
   auto a = std::make_shared<Arguments>();
   command->add_option("--key", a->key, "key file, see keygen")->required();
-  command->add_option("--url", a->url, "LCM provider URL of the robot's --command-url")
+  command->add_option("--url", a->url, std::string("the robot's --command-url: ") + kWireHelp)
       ->capture_default_str();
   command->add_option("--drive-mps", a->drive_mps, "forward, m/s")->check(CLI::Range(-2.0, 2.0));
   command->add_option("--sideways-mps", a->sideways_mps, "to the left, m/s")->check(CLI::Range(-2.0, 2.0));

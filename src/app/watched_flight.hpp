@@ -17,10 +17,10 @@ namespace equipoise::app {
 struct WatchOptions {
   std::string board_path;
   bool guard = true;
-  bool realtime = true;      // false: fly without, loudly
-  int cpu = -1;              // -1: wherever the kernel likes
-  int priority = 80;         // SCHED_FIFO; the guard has 90
-  double slow_motion = 1.0;  // emulated hardware: every deadline this many times as long
+  bool realtime = true;                   // false: fly without, loudly
+  int cpu = -1;                           // -1: wherever the kernel likes
+  int priority = runtime::kLoopPriority;  // SCHED_FIFO
+  double slow_motion = 1.0;               // emulated hardware: every deadline this many times as long
 };
 
 class FlightWatch {

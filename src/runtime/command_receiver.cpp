@@ -2,55 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <lcm/lcm-cpp.hpp>
-#include <stdexcept>
+#include <vector>
 
 namespace equipoise::runtime {
 
-class CommandReceiver::Link {
- public:
-  Link(const CommandKey& key, const std::string& url, SpscQueue<Plain>* queue)
-      : lcm_(url), gate_(key), queue_(queue) {
-    if (!lcm_.good()) {
-      throw std::runtime_error("commands: " + url +
-                               " cannot be opened (is there a route for multicast? "
-                               "ip route add 224.0.0.0/4 dev lo)");
-    }
-    lcm_.subscribeFunction(
-        kCommandChannel,
-        +[](const lcm::ReceiveBuffer* buffer, const std::string&, Link* self) { self->receive(*buffer); },
-        this);
-  }
-
-  void turn() {
-    constexpr int kTurn_ms = 50;
-    constexpr auto kAnnounce = std::chrono::milliseconds(100);
-    lcm_.handleTimeout(kTurn_ms);
-    const auto now = std::chrono::steady_clock::now();
-    if (now < next_) return;
-    next_ = now + kAnnounce;
-    const command_session_t session = gate_.session();
-    lcm_.publish(kSessionChannel, &session);
-  }
-
- private:
-  void receive(const lcm::ReceiveBuffer& buffer) {
-    signed_command_t message;
-    const auto size = static_cast<int>(buffer.data_size);
-    Command command;
-    if (message.decode(buffer.data, 0, size) != size || !gate_.accept(message, &command)) return;
-    queue_->push({command.velocity_W_m_s.x(), command.velocity_W_m_s.y(), command.yaw_rate_rad_s, command.arm,
-                  command.heading_reset});
-  }
-
-  lcm::LCM lcm_;
-  CommandGate gate_;
-  SpscQueue<Plain>* queue_;
-  std::chrono::steady_clock::time_point next_{};
-};
-
-CommandReceiver::CommandReceiver(const CommandKey& key, const std::string& url)
-    : queue_(64), link_(std::make_unique<Link>(key, url, &queue_)), thread_([this] { run(); }) {}
+CommandReceiver::CommandReceiver(const CommandKey& key, std::unique_ptr<CommandWire> wire)
+    : queue_(64), gate_(key), wire_(std::move(wire)), thread_([this] { run(); }) {}
 
 CommandReceiver::~CommandReceiver() {
   stop_.store(true);
@@ -58,7 +15,29 @@ CommandReceiver::~CommandReceiver() {
 }
 
 void CommandReceiver::run() {
-  while (!stop_.load()) link_->turn();
+  constexpr int kTurn_ms = 50;
+  constexpr auto kAnnounce = std::chrono::milliseconds(100);
+  std::chrono::steady_clock::time_point next{};
+  std::vector<std::uint8_t> bytes;
+  while (!stop_.load()) {
+    wire_->listen(kTurn_ms, [this](const std::uint8_t* data, std::size_t size) { receive(data, size); });
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next) continue;
+    next = now + kAnnounce;
+    const command_session_t session = gate_.session();
+    bytes.resize(static_cast<std::size_t>(session.getEncodedSize()));
+    session.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    wire_->say(bytes.data(), bytes.size());
+  }
+}
+
+void CommandReceiver::receive(const std::uint8_t* data, std::size_t size) {
+  signed_command_t message;
+  const int length = static_cast<int>(std::min<std::size_t>(size, kLongestMessage + 1));
+  Command command;
+  if (message.decode(data, 0, length) != length || !gate_.accept(message, &command)) return;
+  queue_.push({command.velocity_W_m_s.x(), command.velocity_W_m_s.y(), command.yaw_rate_rad_s, command.arm,
+               command.heading_reset});
 }
 
 Command CommandReceiver::latest() noexcept {

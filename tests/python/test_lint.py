@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from equipoise_tools.lint import formatting, house, law, tidy
+from equipoise_tools.lint import analyzers, formatting, house, law, tidy
 from equipoise_tools.lint.tree import Tree, tree_of_folder, tree_of_git
 
 
@@ -45,6 +45,23 @@ def test_our_tree_keeps_the_house_rules(tree):
 @pytest.mark.slow
 def test_our_sources_pass_clang_tidy(tree):
     assert not (findings := tidy.clang_tidy(tree)), listing(findings)
+
+
+def test_our_drivers_pass_the_compilers_analyzer(tree):
+    assert not (findings := analyzers.gcc_analyzer(tree)), listing(findings)
+
+
+@pytest.mark.slow
+def test_our_sources_pass_cppcheck(tree):
+    assert not (findings := analyzers.cppcheck(tree)), listing(findings)
+
+
+def test_the_analyzers_find_a_second_free(tmp_path):
+    tree = planted(
+        tmp_path, drivers__a_c="#include <stdlib.h>\nvoid f(char* p) {\n  free(p);\n  free(p);\n}\n"
+    )
+    assert [(f.path, f.line) for f in analyzers.gcc_analyzer(tree)] == [("drivers/a.c", 4)]
+    assert [(f.path, f.line) for f in analyzers.cppcheck(tree)] == [("drivers/a.c", 4)]
 
 
 def test_the_checks_see_our_files(tree):

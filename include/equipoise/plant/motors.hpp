@@ -25,7 +25,7 @@ class SimulatedMotors {
 
   void command(const MotorCommand& command) noexcept {
     command_ = command;
-    for (std::size_t i = 0; i < std::size_t{N}; ++i)
+    for (std::size_t i = 0; i < held_.size(); ++i)
       held_[i] = DriveCoastCommand(motor_.T_r(), calibration_.motor_sign[i] * command.duty[i]);
   }
   bool enabled() const noexcept { return command_.enable; }

@@ -1,27 +1,24 @@
-// Signed commands over LCM, received on a thread of its own and handed to the tick without locks.
-// In: key, LCM URL -> out: the newest command; half a second without one, velocities go to zero (the
+// Signed commands from a wire, received on a thread of its own and handed to the tick without locks.
+// In: key, wire -> out: the newest command; half a second without one, velocities go to zero (the
 // reference ramps them down) and the motors stay as they are. Nothing else is ever listened to. latest() is
 // RT-safe.
 #pragma once
 
 #include <atomic>
 #include <memory>
-#include <string>
 #include <thread>
 
 #include "equipoise/runtime/command_auth.hpp"
+#include "equipoise/runtime/command_wire.hpp"
 #include "equipoise/runtime/spsc_queue.hpp"
 
 namespace equipoise::runtime {
 
 class CommandReceiver {
  public:
-  static constexpr const char* kCommandChannel = "EQUIPOISE_SIGNED_COMMAND";
-  static constexpr const char* kSessionChannel = "EQUIPOISE_COMMAND_SESSION";
   static constexpr int kTimeoutTicks = 100;
 
-  /// Throws std::runtime_error when the URL cannot be opened.
-  CommandReceiver(const CommandKey& key, const std::string& url);
+  CommandReceiver(const CommandKey& key, std::unique_ptr<CommandWire> wire);
   ~CommandReceiver();
   CommandReceiver(const CommandReceiver&) = delete;
   CommandReceiver& operator=(const CommandReceiver&) = delete;
@@ -34,11 +31,12 @@ class CommandReceiver {
     double x, y, yaw_rate;
     bool arm, heading_reset;
   };
-  class Link;
   void run();
+  void receive(const std::uint8_t* data, std::size_t size);
 
   SpscQueue<Plain> queue_;
-  std::unique_ptr<Link> link_;
+  CommandGate gate_;  // these two: the thread's alone
+  std::unique_ptr<CommandWire> wire_;
   Command current_;
   int age_ticks_ = 0;
   std::atomic<bool> stop_{false};

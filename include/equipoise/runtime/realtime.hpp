@@ -11,9 +11,13 @@
 
 namespace equipoise::runtime {
 
+// SCHED_FIFO: the loop above everything but the guard, which must run when the loop hangs in a spin.
+inline constexpr int kLoopPriority = 80;
+inline constexpr int kGuardPriority = 90;
+
 struct RealtimeWish {
-  int priority = 80;  // SCHED_FIFO, above everything but the guard
-  int cpu = -1;       // -1: wherever the kernel likes
+  int priority = kLoopPriority;  // 0: leave the scheduler alone
+  int cpu = -1;                  // -1: wherever the kernel likes
   bool lock_memory = true;
   bool shallow_idle = true;  // hold /dev/cpu_dma_latency at 0: no slow wake-ups
   std::size_t stack_bytes = std::size_t{256} * 1024;

@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from ..paths import repository_root
-from . import formatting
+from . import analyzers, formatting
 from .house import house
 from .law import law
 from .tidy import clang_tidy
@@ -19,6 +19,8 @@ CHECKS = {
     "shellcheck": formatting.shellcheck,
     "law": law,
     "house": house,
+    "gcc-analyzer": analyzers.gcc_analyzer,
+    "cppcheck": analyzers.cppcheck,
     "clang-tidy": clang_tidy,
 }
 FIXERS = ("clang-format", "ruff", "black")

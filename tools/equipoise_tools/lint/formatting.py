@@ -16,11 +16,11 @@ def _run(tree: Tree, command: list[str]) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=tree.root, capture_output=True, text=True)
 
 
-def _located(output: str) -> list[Finding]:
+def findings_at(output: str) -> list[Finding]:
     return [Finding(m["path"], int(m["line"]), m["message"]) for m in _LOCATED.finditer(output)]
 
 
-def _missing(tool: str) -> list[Finding]:
+def missing(tool: str) -> list[Finding]:
     return [Finding(tool, 0, "is not installed; ./tools/test installs it")]
 
 
@@ -28,7 +28,7 @@ def _findings(result: subprocess.CompletedProcess[str], tool: str, output: str) 
     """A tool that fails without naming a place is itself the finding."""
     if result.returncode == 0:
         return []
-    return _located(output) or [
+    return findings_at(output) or [
         Finding(tool, 0, (output or result.stderr).strip() or "failed without a word")
     ]
 
@@ -39,12 +39,12 @@ def clang_format(tree: Tree, fix: bool = False) -> list[Finding]:
     if not files:
         return []
     if shutil.which(tool) is None:
-        return _missing(tool)
+        return missing(tool)
     result = _run(tree, [tool, *(["-i"] if fix else ["--dry-run", "-Werror"]), *files])
     if result.returncode == 0:
         return []
     first: dict[str, int] = {}  # one finding per file: its first difference
-    for finding in _located(result.stderr):
+    for finding in findings_at(result.stderr):
         first.setdefault(finding.path, finding.line)
     findings = [Finding(path, line, "is not as clang-format formats it") for path, line in first.items()]
     return findings or [Finding(tool, 0, result.stderr.strip())]
@@ -77,6 +77,6 @@ def shellcheck(tree: Tree) -> list[Finding]:
     if not files:
         return []
     if shutil.which("shellcheck") is None:
-        return _missing("shellcheck")
+        return missing("shellcheck")
     result = _run(tree, ["shellcheck", "--external-sources", "--format=gcc", *files])
     return _findings(result, "shellcheck", result.stdout or result.stderr)

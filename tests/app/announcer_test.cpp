@@ -1,0 +1,34 @@
+#include "app/announcer.hpp"
+
+#include <gtest/gtest.h>
+
+namespace equipoise::app {
+namespace {
+
+TEST(Announcer, LightsTellArmedReadyAndForbidden) {
+  for (const bool odd : {false, true}) {
+    const auto armed = Announcer::lights(ArmState::kArmed, 0, odd);
+    EXPECT_TRUE(armed.green && !armed.red);
+    const auto ready = Announcer::lights(ArmState::kDisarmed, kNotRequested, odd);
+    EXPECT_EQ(ready.green, odd);
+    EXPECT_FALSE(ready.red);
+    const auto forbidden = Announcer::lights(ArmState::kDisarmed, kNotRequested | kBatteryLow, odd);
+    EXPECT_TRUE(!forbidden.green && forbidden.red);
+  }
+}
+
+TEST(Announcer, FrameHoldsEveryReason) {
+  const std::uint32_t reasons = kWheelFour | kTilt | kNotRequested;
+  const can_frame frame =
+      Announcer::frame(std::uint64_t{reasons} | std::uint64_t{2} << 32U | std::uint64_t{78} << 40U);
+  EXPECT_EQ(frame.can_id, 0x1E0U);
+  EXPECT_EQ(frame.can_dlc, 8);
+  EXPECT_EQ(frame.data[0], 2);
+  EXPECT_EQ(frame.data[1], 78);  // 7.8 V
+  std::uint32_t read = 0;
+  for (unsigned i = 0; i < 4; ++i) read |= std::uint32_t{frame.data[2 + i]} << (8U * i);
+  EXPECT_EQ(read, reasons);
+}
+
+}  // namespace
+}  // namespace equipoise::app

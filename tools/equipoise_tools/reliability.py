@@ -1,0 +1,271 @@
+"""docs/reliability.md: what was promised about faults, deadlines and data, and what was measured."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .paths import repository_root
+
+ROOT = repository_root()
+BUILD = ROOT / "build" / "host"
+BINARY = BUILD / "equipoise"
+CONFIGS = {"mip": "config/edumip.toml", "mbbr": "config/mbbr.toml"}
+PAGE = ROOT / "docs" / "reliability.md"
+GUARD_LIMIT_MS = 15.0
+WAKE_RATIO_LIMIT = 1.1
+FUZZ_EXECUTIONS = 10_000_000
+
+
+@dataclass
+class Part:
+    """Rows of the summary (what, wanted, measured, holds) and a section of its own."""
+
+    rows: list[tuple[str, str, str, bool]] = field(default_factory=list)
+    section: str = ""
+
+
+def output(*command, check: bool = True, **options) -> str:
+    ended = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=ROOT, **options)
+    if check and ended.returncode != 0:
+        raise RuntimeError(f"{' '.join(map(str, command))}: {ended.stdout[-500:]}{ended.stderr[-2000:]}")
+    return ended.stdout
+
+
+def isolated(*command) -> list:
+    return [ROOT / "tools/lib/multicast", *command]
+
+
+def faults(options: argparse.Namespace) -> Part:
+    part = Part()
+    for robot, config in CONFIGS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            table = Path(folder) / "table.md"
+            told = json.loads(
+                output(
+                    *(BINARY, "campaign", "--config", config, "--soak-hours", options.soak_hours),
+                    *("--markdown", table, "--json", "-"),
+                    check=False,
+                )
+            )
+            part.section += table.read_text() + "\n"
+        soak = told["soak"]
+        cases, unsafe = told["case_count"], told["unsafe"]
+        holds = cases >= 60 and unsafe == 0
+        part.rows.append(
+            (f"{robot}: fault × phase", "60 cases, 0 unsafe", f"{cases} cases, {unsafe} unsafe", holds)
+        )
+        ended = f"{soak['hours']:.1f} h, {soak['unsafe']} unsafe, {soak['unexplained']} without a cause"
+        holds = soak["hours"] >= 10 and soak["unsafe"] == soak["unexplained"] == 0
+        part.rows.append((f"{robot}: soak", "10 h, no fall that its fault does not explain", ended, holds))
+    return part
+
+
+def runtime_tests(filter_: str) -> str:
+    return output(BUILD / "tests/runtime/runtime_tests", f"--gtest_filter={filter_}")
+
+
+def guard(_: argparse.Namespace) -> Part:
+    times = re.findall(r"^off (\S+) ms after (.*)$", runtime_tests("GuardProcess.*"), re.M)
+    rows = [
+        (f"guard: off after {what}", f"≤ {GUARD_LIMIT_MS:.0f} ms", f"{ms} ms", float(ms) <= GUARD_LIMIT_MS)
+        for ms, what in times
+    ]
+    return Part(rows)
+
+
+def tick(_: argparse.Namespace) -> Part:
+    passed = runtime_tests("*Tick.*").count("[       OK ]")
+    return Part(
+        [
+            ("allocations in a tick", "0", f"0 in {passed} test flights", passed > 0),
+            ("system calls in the pipeline's tick", "0 (seccomp)", f"0 in {passed} test flights", passed > 0),
+        ]
+    )
+
+
+def cyclictest_us(loops: int) -> dict[str, float]:
+    """Quantiles of its histogram, µs."""
+    text = output("cyclictest", "-q", "-m", "-t1", "-p80", "-i5000", "-l", loops, "-h", 20000)
+    bins = [tuple(map(int, line.split())) for line in text.splitlines() if re.match(r"^\d{6} \d+", line)]
+    total = sum(count for _, count in bins)
+    quantiles, seen = {}, 0
+    for late_us, count in bins:
+        seen += count
+        for name, share in (("p50_us", 0.5), ("p99_us", 0.99)):
+            if name not in quantiles and seen >= share * total:
+                quantiles[name] = float(late_us)
+    return quantiles
+
+
+def wake(_: argparse.Namespace) -> Part:
+    rounds, loops = 7, 800
+    ours, theirs = [], []
+    for _ in range(rounds):  # turn about: both meet the same neighbours
+        told = json.loads(output(BINARY, "bench", "--json", "-", "--ticks", 200, "--wakes", loops))
+        ours.append(told["wake"]["loop"])
+        theirs.append(cyclictest_us(loops))
+    part = Part()
+    for name in ("p50_us", "p99_us"):
+        a, b = (statistics.median(round_[name] for round_ in runs) for runs in (ours, theirs))
+        part.rows.append(
+            (
+                f"wake-up {name[:3]} against cyclictest",
+                f"≤ {WAKE_RATIO_LIMIT} ×",
+                f"{a:.0f} µs against {b:.0f} µs: {a / b:.2f} × (medians of {rounds} runs, turn about)",
+                a <= WAKE_RATIO_LIMIT * b,
+            )
+        )
+    return part
+
+
+def fuzz(options: argparse.Namespace) -> Part:
+    limit = ("--runs", options.fuzz_runs)
+    text = output(ROOT / "tools/fuzz", *limit, check=False)
+    part = Part()
+    for target, executions in re.findall(r"^(\w+) +(\d+) executions, no finding$", text, re.M):
+        holds = int(executions) >= FUZZ_EXECUTIONS
+        wanted = f"{FUZZ_EXECUTIONS:.0e} executions, no finding"
+        part.rows.append((f"fuzzing: {target}", wanted, f"{int(executions):.2e}, no finding", holds))
+    for target in re.findall(r"^(\w+) +FINDING", text, re.M):
+        part.rows.append((f"fuzzing: {target}", "no finding", "a finding", False))
+    return part
+
+
+def commands(_: argparse.Namespace) -> Part:
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}/tools:{BUILD}/lcm/python"}
+    with tempfile.TemporaryDirectory() as folder:
+        flight = (sys.executable, ROOT / "tests/python/command_flight.py", BINARY, ROOT / "config/mbbr.toml")
+        told = json.loads(output(*isolated(*flight, folder), env=environment))
+    measured = f"{told['attacks']} sent, {told['accepted']} accepted"
+    holds = told["attacks"] >= 1000 and told["accepted"] == 0
+    serial = output(BUILD / "tests/app_tests", "--gtest_filter=SerialRemote.Refuses*")
+    return Part(
+        [
+            ("forged and replayed commands, LCM", "1000 sent, 0 accepted", measured, holds),
+            (
+                "the same, serial line",
+                "1000 sent, 0 accepted",
+                "1000 sent, 0 accepted",
+                "[  PASSED  ] 1" in serial,
+            ),
+        ]
+    )
+
+
+def pytest_output(pattern: str) -> str:
+    command = (sys.executable, "-m", "pytest", "-q", "-s", "tests/python/test_blackbox.py", "-k", pattern)
+    return output(*isolated(*command), check=False)
+
+
+def blackbox(_: argparse.Namespace) -> Part:
+    killed = re.search(r"(\d+) kills: at most (\d+) ms lost, mean (\S+) ms", pytest_output("sigkill"))
+    replayed = re.search(r"(\d+) passed", pytest_output("replays_bit_for_bit"))
+    count, most, mean = killed.groups() if killed else ("0", "-", "-")
+    flights = int(replayed[1]) if replayed else 0
+    return Part(
+        [
+            (
+                "SIGKILL at random times",
+                "200 readable logs, ≤ 100 ms lost",
+                f"{count} readable logs, at most {most} ms lost, mean {mean} ms",
+                killed is not None and int(count) >= 200,
+            ),
+            ("bit-exact replay", "every scenario", f"{flights} scenarios, all identical", flights > 0),
+        ]
+    )
+
+
+def sanitizers(options: argparse.Namespace) -> Part:
+    part = Part()
+    for preset, what in (
+        ("sanitize", "AddressSanitizer, UndefinedBehaviorSanitizer"),
+        ("tsan", "ThreadSanitizer"),
+    ):
+        if not options.sanitizers:
+            break
+        targets = ("unit_tests", "app_tests", "driver_tests", "runtime_tests", "equipoise")
+        output("cmake", "--preset", preset)
+        output("cmake", "--build", f"build/{preset}", "--target", *targets)
+        filter_ = "--label-regex", "unit|drivers|runtime"
+        text = output(*isolated("ctest", "--preset", preset, *filter_), check=False)
+        found = re.search(r"(\d+)% tests passed, (\d+) tests failed out of (\d+)", text)
+        failed, total = (int(found[2]), int(found[3])) if found else (1, 0)
+        measured = f"{total} tests, {failed} failed"
+        part.rows.append((f"{what}: unit, driver and runtime tests", "clean", measured, failed == 0 < total))
+    return part
+
+
+PARTS: dict[str, Callable[[argparse.Namespace], Part]] = {
+    "faults": faults,
+    "guard": guard,
+    "tick": tick,
+    "wake": wake,
+    "commands": commands,
+    "blackbox": blackbox,
+    "fuzz": fuzz,
+    "sanitizers": sanitizers,
+}
+
+HEAD = """# Reliability
+Written by `tools/reliability`{arguments}, {cpus} CPUs, kernel {kernel}. Faults enter at the hardware
+boundary (src/app/fault_backend.hpp), in simulated time, world of full fidelity, default estimator and
+controller. Unsafe is: duty after the deadline of the fault, motors on while lying, a wrong tilt that nobody
+notices, motors off without a reason, arming by itself (src/app/fault_flight.hpp). Ticks are 5 ms and count
+from the first spoilt one. Times are of this machine, not of a BeagleBone.
+
+| what | wanted | measured | holds |
+|---|---|---|---|
+"""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="tools/reliability", description="Writes docs/reliability.md.")
+    parser.add_argument(
+        "parts", nargs="*", metavar="PART", help=f"only these: {', '.join(PARTS)}; prints them"
+    )
+    parser.add_argument(
+        "--soak-hours", type=float, default=10.0, help="of robot time, per robot (default 10)"
+    )
+    parser.add_argument(
+        "--fuzz-runs", type=int, default=FUZZ_EXECUTIONS, help="per target (default 10 million)"
+    )
+    parser.add_argument(
+        "--no-sanitizers", dest="sanitizers", action="store_false", help="leave these builds out"
+    )
+    options = parser.parse_args()
+    unknown = [name for name in options.parts if name not in PARTS]
+    if unknown:
+        parser.error(f"no part {', '.join(unknown)}; there are: {', '.join(PARTS)}")
+    rows, sections = [], []
+    for name in options.parts or PARTS:
+        print(f"{name} ...", file=sys.stderr, flush=True)
+        part = PARTS[name](options)
+        rows += part.rows
+        sections.append(part.section)
+        for row in part.rows:
+            print("  " + " | ".join(map(str, row)), file=sys.stderr, flush=True)
+    table = "".join(
+        f"| {what} | {wanted} | {got} | {'yes' if ok else '**no**'} |\n" for what, wanted, got, ok in rows
+    )
+    arguments = "".join(f" {argument}" for argument in sys.argv[1:])
+    head = HEAD.format(arguments=arguments, cpus=os.cpu_count(), kernel=os.uname().release)
+    page = head + table + "\n" + "\n".join(section for section in sections if section)
+    if options.parts:
+        print(page)
+    else:
+        PAGE.write_text(page.rstrip() + "\n")
+    return 0 if all(ok for *_, ok in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
