@@ -26,8 +26,8 @@ typedef struct can_port {
 
 int can_open(can_port_t* port, const char* interface); /* -ENODEV: no such interface; -ENETDOWN: not up */
 
-/* -ENOBUFS or -EAGAIN: dropped and counted; -ENETDOWN: interface down, bus off; -EINVAL: longer than 8 bytes.
- */
+/* -ENOBUFS or -EAGAIN: dropped and counted; -ENETDOWN: interface down; -EINVAL: longer than 8 bytes. While
+ * the bus is off the kernel drops what it takes: the state tells. */
 int can_send(can_port_t* port, const struct can_frame* frame);
 
 /* 0: *out is a data or remote frame; -EAGAIN: none. Error frames update the state and are not returned; at

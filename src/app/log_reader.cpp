@@ -19,14 +19,16 @@ std::uint64_t big_endian(std::string_view bytes) {
   return value;
 }
 
+std::size_t length(std::string_view four_bytes) { return static_cast<std::size_t>(big_endian(four_bytes)); }
+
 }  // namespace
 
 bool LogReader::next(LogEvent* event) {
   while (at_ < bytes_.size()) {
     const std::string_view rest = bytes_.substr(at_);
     if (rest.size() >= kHeader && rest.substr(0, 4) == kSync) {
-      const std::uint64_t channel = big_endian(rest.substr(20, 4));
-      const std::uint64_t data = big_endian(rest.substr(24, 4));
+      const std::size_t channel = length(rest.substr(20, 4));
+      const std::size_t data = length(rest.substr(24, 4));
       if (channel <= kLongestChannel && data <= kLargestMessage && kHeader + channel + data <= rest.size()) {
         event->utime = static_cast<std::int64_t>(big_endian(rest.substr(12, 8)));
         event->channel = rest.substr(kHeader, channel);

@@ -77,7 +77,9 @@ void apply_override(toml::table& root, const std::string& text) {
 
 /// Replaces values of `root` by those of a fragment; a key that the configuration lacks is a mistake.
 void merge(toml::table& root, toml::table&& fragment, const std::string& path, const std::string& where) {
-  for (auto&& [key, value] : fragment) {
+  for (auto&& entry : fragment) {
+    const toml::key& key = entry.first;
+    toml::node& value = entry.second;
     const std::string name = where.empty() ? std::string(key.str()) : where + "." + std::string(key.str());
     if (!root.contains(key)) {
       throw ConfigError(at(path, value.source()) + ": " + name + ": no such key in the configuration");

@@ -67,6 +67,7 @@ Bench::Bench() {
   unexportAll();
   for (const char* device : {"imu", "pwm", "counter", "adc"}) fault(device, 0, 0);
   setImu({0, 0, 4096}, {0, 0, 0});
+  writeText(kDebug + "counter_stuck", "0");
   setCounts({0, 0, 0});
   drivePin("481ae000", kDataReadyLine, true);
 }
@@ -126,6 +127,10 @@ void Bench::pushFifo(const std::vector<uint8_t>& bytes) {
 
 void Bench::setCounts(const std::array<int64_t, 3>& counts) {
   writeBytes(kDebug + "counter_positions", counts.data(), sizeof counts);
+}
+
+void Bench::stickCounter(unsigned decoder) {
+  writeText(kDebug + "counter_stuck", std::to_string(1u << decoder));
 }
 
 void Bench::setAdc(unsigned channel, uint32_t counts) {

@@ -28,6 +28,7 @@ class Bench {
   void setImu(const std::array<int16_t, 3>& accel, const std::array<int16_t, 3>& gyro);
   void pushFifo(const std::vector<uint8_t>& bytes);
   void setCounts(const std::array<int64_t, 3>& counts);
+  void stickCounter(unsigned decoder);  // its count stays, wherever the wheel goes
   void setAdc(unsigned channel, uint32_t counts);
   void fault(const std::string& device, int error,
              uint32_t times);  // imu, pwm, counter, adc; UINT32_MAX: forever

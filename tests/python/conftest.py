@@ -1,5 +1,6 @@
 """What the Python tests share."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -12,6 +13,14 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture(scope="session")
 def root() -> Path:
     return ROOT
+
+
+def pytest_collection_modifyitems(items):
+    if os.environ.get("EQUIPOISE_CROSS"):
+        return
+    for item in items:
+        if item.get_closest_marker("cross"):
+            item.add_marker(pytest.mark.skip(reason="needs the cross build; tools/cross-test runs it"))
 
 
 @pytest.fixture(scope="session")

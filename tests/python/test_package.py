@@ -103,10 +103,13 @@ def test_run_tells_the_service_manager_that_it_is_ready_and_alive(root, tmp_path
     assert manager.recv(100) == b"STOPPING=1"
 
 
-@pytest.mark.slow
-def test_the_package_is_whole_and_clean(root, tmp_path):
+def packed(root, tmp_path, *arguments: str) -> tuple[str, str]:
+    """The package's path and its fields; its contents are in tmp_path / "tree"."""
     ended = subprocess.run(
-        [root / "tools/package", "--output", tmp_path], capture_output=True, text=True, timeout=1200
+        [root / "tools/package", "--output", tmp_path, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=1200,
     )
     assert ended.returncode == 0, ended.stderr  # lintian among it
     package = ended.stdout.strip()
@@ -122,5 +125,49 @@ def test_the_package_is_whole_and_clean(root, tmp_path):
         "lib/firmware/equipoise-cape.dtbo",
     ):
         assert (tmp_path / "tree" / place).stat().st_size > 0
+    return package, fields
+
+
+@pytest.mark.slow
+def test_the_package_is_whole_and_clean(root, tmp_path):
+    package, _ = packed(root, tmp_path)
     ended = subprocess.run([tmp_path / "tree/usr/bin/equipoise", "--version"], capture_output=True, text=True)
     assert ended.stdout.strip() in package
+
+
+@pytest.mark.cross
+def test_the_robots_package_is_for_its_processor(root, tmp_path):
+    package, fields = packed(root, tmp_path, "--preset", "bbb")
+    assert package.endswith("_armhf.deb") and "\nArchitecture: armhf\n" in fields
+    program = tmp_path / "tree/usr/bin/equipoise"
+    header = subprocess.run(
+        ["arm-linux-gnueabihf-readelf", "-h", "-A", program], capture_output=True, text=True
+    ).stdout
+    assert "hard-float ABI" in header and 'Tag_CPU_name: "8-A"' not in header
+    assert re.search(r"Tag_CPU_arch: v7$", header, re.M), header
+    emulator = ["qemu-arm", "-cpu", "cortex-a8", "-L", root / "build/sysroot"]
+    ended = subprocess.run([*emulator, program, "--version"], capture_output=True, text=True)
+    assert ended.stdout.strip() in package, ended.stderr
+
+
+@pytest.mark.cross
+def test_every_library_of_the_robots_package_comes_from_a_package_it_depends_on(root, tmp_path):
+    _, fields = packed(root, tmp_path, "--preset", "bbb", "--no-lint")
+    depends = set(
+        re.findall(r"([a-z0-9.+-]+)(?: \([^)]*\))?(?:, |$)", re.search(r"^Depends: (.*)$", fields, re.M)[1])
+    )
+    dynamic = subprocess.run(
+        ["arm-linux-gnueabihf-readelf", "-d", tmp_path / "tree/usr/bin/equipoise"],
+        capture_output=True,
+        text=True,
+    ).stdout
+    needed = re.findall(r"\(NEEDED\).*\[(.*)\]", dynamic)
+    lists = root / "build/bbb/package/dpkg/info"
+    for library in needed:
+        owners = {
+            f.name.split(".list")[0].split(":")[0]
+            for f in lists.glob("*.list")
+            if f"/{library}\n" in f.read_text()
+        }
+        assert owners & depends, f"{library} of {owners}, package depends on {depends}"
+    assert len(needed) >= 5

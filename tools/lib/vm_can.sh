@@ -3,21 +3,39 @@
 # shellcheck shell=bash disable=SC2154
 
 can_tree=$vm/can-kernel
+can_modules=$vm/can-modules
 
 # prepare_can_machine: sets can_kernel_version.
 prepare_can_machine() {
-  local image stamp=$vm/can-kernel.stamp
+  local image version stamp=$vm/can-kernel.stamp
   [ "$(dpkg --print-architecture)" = amd64 ] || die "the CAN machine needs an amd64 host"
-  if [ ! -f "$stamp" ]; then
+  if [ ! -f "$stamp" ] || [ ! -d "$vm/can-headers" ]; then
     image=$(image_of amd64 linux-image-amd64)
-    download_only amd64 "$image" busybox-static
-    rm -rf "$can_tree"
+    version=${image#linux-image-}
+    download_only amd64 "$image" "linux-headers-$version" "linux-headers-${version%-amd64}-common" linux-kbuild-6.1 \
+      busybox-static
+    rm -rf "$can_tree" "$vm/can-headers"
     unpack "$can_tree" "$vm/debs/${image}"_*_amd64.deb "$vm/debs"/busybox-static_*_amd64.deb
-    printf '%s\n' "${image#linux-image-}" >"$stamp"
+    unpack "$vm/can-headers" "$vm/debs/linux-headers-${version%-amd64}"{-amd64,-common}_*.deb \
+      "$vm/debs"/linux-kbuild-6.1_*_amd64.deb
+    printf '%s\n' "$version" >"$stamp"
   fi
   can_kernel_version=$(cat "$stamp")
+  build_can_modules
   make_initramfs "$can_tree" "$can_kernel_version" "$root/tests/hardware/canbus/init" "$vm/can-initramfs.gz" \
-    virtio_pci 9p 9pnet_virtio can-raw kvaser_pci
+    virtio_pci 9p 9pnet_virtio can-raw kvaser_pci "$can_modules/can_errors.ko"
+}
+
+build_can_modules() {
+  local source=$root/tests/hardware/kernel/can wanted stamp=$can_modules/stamp
+  wanted=$(cat "$source"/*)" $can_kernel_version"
+  [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ] || return 0
+  prepare_source
+  rm -rf "$can_modules"
+  mkdir -p "$can_modules"
+  cp "$source"/* "$vm/source/drivers/net/can/sja1000/sja1000.h" "$can_modules/"
+  make_modules "$vm/can-headers" "$can_kernel_version" "$can_modules"
+  printf '%s\n' "$wanted" >"$stamp"
 }
 
 # run_can_machine SECONDS PROGRAM: the console on stdout.

@@ -29,6 +29,40 @@ image_of() {
   printf '%s\n' "$image"
 }
 
+# prepare_source: of the kernel's source, in build/vm/source, what modules and the board's device tree are made of.
+prepare_source() {
+  local stamp=$vm/source.stamp parts=('drivers/gpio/*.[ch]' 'kernel/irq/irq_sim.c' 'drivers/counter/*.[ch]'
+    'drivers/net/can/sja1000/*.h' 'arch/arm/boot/dts/am33*' 'arch/arm/boot/dts/tps65217.dtsi' 'include/dt-bindings/*'
+    'include/uapi/linux/input-event-codes.h')
+  [ "$(cat "$stamp" 2>/dev/null)" != "${parts[*]}" ] || return 0
+  download_only armhf linux-source-6.1
+  rm -rf "$vm/source"
+  unpack "$vm/source" "$vm/debs"/linux-source-6.1_*.deb
+  tar -xJf "$vm/source/usr/src/linux-source-6.1.tar.xz" -C "$vm/source" --strip-components=1 --wildcards "${parts[@]/#/*/}"
+  rm -rf "$vm/source/usr" "$vm/debs"/linux-source-*.deb
+  printf '%s\n' "${parts[*]}" >"$stamp"
+}
+
+# board_tree OUTPUT: the BeagleBone Black's device tree with symbols, which that of Debian's kernel packages lacks.
+board_tree() {
+  local trees=$vm/source/arch/arm/boot/dts
+  prepare_source
+  cpp -nostdinc -undef -x assembler-with-cpp -I "$vm/source/include" "$trees/am335x-boneblack.dts" "$1.dts"
+  dtc -q -@ -I dts -O dtb -i "$trees" -o "$1" "$1.dts"
+}
+
+# make_modules HEADERS VERSION DIRECTORY VARIABLE=VALUE...: builds DIRECTORY's modules against Debian's unpacked headers.
+make_modules() {
+  local headers=$1/usr/src/linux-headers-$2 directory=$3 log=$3.log
+  # The headers include each other, and the kbuild tools, by absolute path.
+  find "$headers" -maxdepth 1 -name Makefile -exec sed -i "s#\([ =]\)/usr/src/#\1$1/usr/src/#g" {} +
+  say "Building kernel modules for $2"
+  make -C "$headers" M="$directory" "${@:4}" -j "$jobs" modules >"$log" 2>&1 || {
+    tail -30 "$log" >&2
+    die "the kernel modules did not build; log: $log"
+  }
+}
+
 # make_initramfs TREE VERSION INIT OUTPUT MODULE...: busybox, the modules and all they need in loading order (a name
 # of the kernel's tree or the path of a .ko), and the first process.
 make_initramfs() {

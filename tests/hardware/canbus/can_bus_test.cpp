@@ -1,5 +1,6 @@
 // Two real CAN controllers (SJA1000) on one emulated bus: what a virtual interface cannot show. Needs root,
-// `ip` and the machine of tools/vm-test.
+// `ip` and the machine of tools/vm-test. The emulated bus never fails by itself: kernel/can/can_errors.c
+// counts errors into a controller, all that follows is the kernel's.
 #include <can.h>
 #include <errno.h>
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <string>
 
 namespace {
@@ -43,6 +45,26 @@ class CanBus : public ::testing::Test {
   void TearDown() override {
     can_close(&a_);
     can_close(&b_);
+  }
+  // The controller's transmit errors, as they add up on a bus that nobody acknowledges.
+  static void countErrors(const std::string& interface, int errors) {
+    std::ofstream file("/sys/kernel/debug/can_errors/transmit");
+    file << interface << ' ' << errors << std::flush;
+    ASSERT_TRUE(file.good()) << "no can_errors module";
+  }
+  // Takes in what the kernel has to say until the state is reached; false: it never came.
+  static bool becomes(can_port_t& port, can_bus_state state) {
+    can_frame frame{};
+    while (port.state != state && readable(port)) (void)can_receive(&port, &frame);
+    return port.state == state;
+  }
+  void expectFrameCrosses(canid_t id) {
+    const can_frame there = frameOf(id, 3, 50);
+    can_frame seen{};
+    ASSERT_EQ(can_send(&a_, &there), 0);
+    ASSERT_TRUE(readable(b_));
+    ASSERT_EQ(can_receive(&b_, &seen), 0);
+    EXPECT_EQ(seen.can_id, id);
   }
   can_port_t a_{}, b_{};
 };
@@ -100,4 +122,51 @@ TEST_F(CanBus, AnInterfaceThatGoesDownIsReportedAndComesBack) {
   ASSERT_EQ(can_send(&a_, &frame), 0);
   ASSERT_TRUE(readable(b_));
   EXPECT_EQ(can_receive(&b_, &seen), 0);
+}
+
+TEST_F(CanBus, ErrorsMakeTheControllerPassiveAndItComesBack) {
+  EXPECT_EQ(a_.state, CAN_BUS_ACTIVE);
+  countErrors("can0", 100);
+  EXPECT_TRUE(becomes(a_, CAN_BUS_WARNING));
+  EXPECT_EQ(a_.tx_errors, 100);
+  countErrors("can0", 130);
+  EXPECT_TRUE(becomes(a_, CAN_BUS_PASSIVE));
+  EXPECT_EQ(a_.tx_errors, 130);
+  EXPECT_EQ(b_.state, CAN_BUS_ACTIVE) << "the other controller is well";
+  expectFrameCrosses(0x21);  // passive still takes part
+  countErrors("can0", 120);
+  EXPECT_TRUE(becomes(a_, CAN_BUS_WARNING));
+  countErrors("can0", 0);
+  EXPECT_TRUE(becomes(a_, CAN_BUS_ACTIVE));
+  EXPECT_EQ(a_.bus_offs, 0u);
+}
+
+TEST_F(CanBus, BusOffIsReportedAndTheKernelRestartsTheController) {
+  countErrors("can0", 256);
+  ASSERT_TRUE(becomes(a_, CAN_BUS_OFF));
+  EXPECT_EQ(a_.bus_offs, 1u);
+  ASSERT_TRUE(becomes(a_, CAN_BUS_ACTIVE)) << "restart-ms has passed";
+  expectFrameCrosses(0x31);
+  EXPECT_EQ(a_.bus_offs, 1u);
+}
+
+TEST_F(CanBus, WithoutAutomaticRestartItStaysOffUntilItIsRestarted) {
+  ASSERT_EQ(ip("can0 down"), 0);
+  ASSERT_EQ(ip("can0 type can restart-ms 0"), 0);
+  ASSERT_EQ(ip("can0 up"), 0);
+  countErrors("can0", 256);
+  ASSERT_TRUE(becomes(a_, CAN_BUS_OFF));
+  usleep(300000);
+  const can_frame lost = frameOf(0x40, 8, 0);
+  for (int i = 0; i < 5000; ++i) {  // never blocks
+    const int status = can_send(&a_, &lost);
+    ASSERT_TRUE(status == 0 || status == -ENOBUFS || status == -EAGAIN) << status;
+  }
+  can_frame seen{};
+  EXPECT_EQ(can_receive(&b_, &seen), -EAGAIN) << "nothing crosses";
+  EXPECT_EQ(can_receive(&a_, &seen), -EAGAIN) << "nobody restarts it";
+  EXPECT_EQ(a_.state, CAN_BUS_OFF);
+  ASSERT_EQ(ip("can0 type can restart"), 0);
+  ASSERT_TRUE(becomes(a_, CAN_BUS_ACTIVE));
+  expectFrameCrosses(0x41);
 }

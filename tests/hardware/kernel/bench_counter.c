@@ -24,6 +24,7 @@ struct bench_decoder {
 static struct bench_decoder decoders[DECODERS] = {
     {.name = "48300180"}, {.name = "48302180"}, {.name = "48304180"}};
 static s64 positions[DECODERS]; /* where the wheels are, in counts */
+static u8 stuck;		/* bit n: decoder n keeps its count */
 static struct bench_fault fault;
 
 static struct bench_decoder *decoder_of(struct counter_device *counter)
@@ -183,13 +184,17 @@ int bench_counter_plug(const char *name, bool in)
 static ssize_t positions_write(struct file *file, const char __user *from, size_t size, loff_t *at)
 {
 	s64 values[DECODERS];
+	int i;
 
 	if (size != sizeof(values))
 		return -EINVAL;
 	if (copy_from_user(values, from, sizeof(values)))
 		return -EFAULT;
 	mutex_lock(&bench_lock);
-	memcpy(positions, values, sizeof(values));
+	for (i = 0; i < DECODERS; i++) {
+		if (!(stuck & BIT(i)))
+			positions[i] = values[i];
+	}
 	mutex_unlock(&bench_lock);
 	return size;
 }
@@ -201,6 +206,7 @@ int bench_counter_init(struct dentry *dir)
 	int i, err = 0;
 
 	debugfs_create_file("counter_positions", 0200, dir, NULL, &positions_fops);
+	debugfs_create_u8("counter_stuck", 0644, dir, &stuck);
 	bench_fault_files("counter", dir, &fault);
 	for (i = 0; !err && i < DECODERS; i++)
 		err = plug(&decoders[i]);

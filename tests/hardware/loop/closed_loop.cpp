@@ -1,16 +1,22 @@
 #include "closed_loop.hpp"
 
-#include <unistd.h>
+#include <time.h>
 
 #include <cmath>
+#include <cstring>
 
 using equipoise::MotorCommand;
 using equipoise::RawSample;
 
 namespace {
 constexpr int kMotors = 3;
-constexpr int kPoll_us = 200;
-constexpr int kPatiencePolls = 5000;
+constexpr std::int64_t kPeriod_ns = 5'000'000;
+
+std::int64_t monotonicNow() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
+}
 
 equipoise::MbbrWorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
   equipoise::MbbrWorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kFull)];
@@ -19,23 +25,26 @@ equipoise::MbbrWorldParams worldOf(const equipoise::MbbrConfig& config, std::uin
 }
 }  // namespace
 
-PinWorld::PinWorld(Bench& bench, const equipoise::MbbrConfig& config, std::uint64_t seed,
-                   const std::atomic<std::uint32_t>& firmware_ticks)
+PinWorld::PinWorld(Bench& bench, const equipoise::app::Board& board, const equipoise::MbbrConfig& config,
+                   std::uint64_t seed)
     : bench_(bench),
-      firmware_ticks_(firmware_ticks),
+      wiring_(board.wiring),
       world_(config.robot, config.motor, config.calibration, worldOf(config, seed)) {
+  for (const bbb_motor_t& motor : wiring_.motor) {
+    if (motor.fault.used) bench_.drivePin(motor.fault.chip, motor.fault.line, true);  // no bridge complains
+  }
   show(world_.sense());
 }
 
 MotorCommand PinWorld::pins() const {
   MotorCommand command;
   const auto channels = bench_.pwm();
-  const std::size_t channel_of[kMotors] = {0, 1, 2};
-  command.enable = bench_.pin(board_.enable.chip, board_.enable.line);
+  command.enable = bench_.pin(wiring_.enable.chip, wiring_.enable.line);
   for (int i = 0; i < kMotors; ++i) {
-    const Bench::Channel& channel = channels[channel_of[i]];
-    const bool in1 = bench_.pin(board_.motor[i].in1.chip, board_.motor[i].in1.line);
-    const bool in2 = bench_.pin(board_.motor[i].in2.chip, board_.motor[i].in2.line);
+    const std::size_t module = std::strcmp(wiring_.motor[i].pwm, "48302200") == 0 ? 0 : 2;
+    const Bench::Channel& channel = channels[module + wiring_.motor[i].pwm_channel];
+    const bool in1 = bench_.pin(wiring_.motor[i].in1.chip, wiring_.motor[i].in1.line);
+    const bool in2 = bench_.pin(wiring_.motor[i].in2.chip, wiring_.motor[i].in2.line);
     const double direction = (in1 ? 1.0 : 0.0) - (in2 ? 1.0 : 0.0);
     const double on = channel.enabled == 0 ? 0.0 : static_cast<double>(channel.duty_ns);
     const double period = static_cast<double>(channel.period_ns);
@@ -48,7 +57,7 @@ bool PinWorld::motorsOff() const {
   for (const Bench::Channel& channel : bench_.pwm()) {
     if (channel.enabled != 0 && channel.duty_ns != 0) return false;
   }
-  return !bench_.pin(board_.enable.chip, board_.enable.line);
+  return !bench_.pin(wiring_.enable.chip, wiring_.enable.line);
 }
 
 void PinWorld::show(const RawSample& raw) {
@@ -65,17 +74,20 @@ void PinWorld::show(const RawSample& raw) {
   }
   bench_.setImu(accel, gyro);
   bench_.setCounts(wheels);
-  bench_.setAdc(board_.battery_channel, static_cast<uint32_t>(std::lround(raw.battery_counts)));
+  bench_.setAdc(wiring_.battery_channel, static_cast<uint32_t>(std::lround(raw.battery_counts)));
 }
 
-bool PinWorld::tick(bool data_ready) {
+void PinWorld::tick(bool data_ready) {
+  const std::int64_t now_ns = monotonicNow();
+  if (due_ns_ == 0) due_ns_ = now_ns;
+  due_ns_ += kPeriod_ns;
+  if (now_ns > due_ns_) {
+    ++late_;
+    due_ns_ = now_ns;
+  }
+  const timespec at{static_cast<time_t>(due_ns_ / 1'000'000'000), static_cast<long>(due_ns_ % 1'000'000'000)};
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
   world_.advance(pins());
   show(world_.sense());
-  const std::uint32_t before = firmware_ticks_;
   if (data_ready) bench_.dataReady();
-  for (int poll = 0; poll < kPatiencePolls; ++poll) {
-    if (firmware_ticks_ != before) return true;
-    usleep(kPoll_us);
-  }
-  return false;
 }
