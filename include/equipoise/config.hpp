@@ -16,8 +16,8 @@
 #include "equipoise/estimate/mbbr_estimators.hpp"
 #include "equipoise/estimate/mip_estimators.hpp"
 #include "equipoise/pipeline.hpp"
+#include "equipoise/plant/mbbr_world.hpp"
 #include "equipoise/plant/mip_world.hpp"
-#include "equipoise/plant/world.hpp"
 
 namespace equipoise {
 
@@ -41,7 +41,7 @@ struct MbbrConfig {
   MbbrScheduledFeedbackParams scheduled;
   SafetyParams safety;
   AttitudeFilterParams attitude;
-  std::array<WorldParams, 3> world;          // by Fidelity
+  std::array<MbbrWorldParams, 3> world;      // by Fidelity
   std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
 
   MbbrThesisPipeline::Params thesis_pipeline() const;

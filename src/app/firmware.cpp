@@ -58,8 +58,8 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
-    if (!config.world[i].friction) config.friction.gain = 0.0;
-    if (config.world[i].gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;
+    if (!config.world[i].common.friction) config.friction.gain = 0.0;
+    if (config.world[i].common.gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;
   }
   return config;
 }

@@ -69,8 +69,8 @@ struct MbbrFirmware {
 
   /// `config` as it flies; `level` of fidelity.
   static World world(const Config& config, std::size_t level, std::uint64_t seed) {
-    WorldParams params = config.world[level];
-    params.seed = seed;
+    MbbrWorldParams params = config.world[level];
+    params.common.seed = seed;
     return World(config.robot, config.motor, config.calibration, params);
   }
 };

@@ -20,12 +20,13 @@ struct MbbrRigOptions {
 inline MbbrConfig configured_for(MbbrConfig config, const MbbrRigOptions& options) {
   const auto level = static_cast<std::size_t>(options.fidelity);
   config.motor.bridge = config.world_bridge[level];
-  config.world[level].seed = options.seed;
-  if (!config.world[level].friction) config.friction.gain = 0.0;
+  config.world[level].common.seed = options.seed;
+  if (!config.world[level].common.friction) config.friction.gain = 0.0;
   config.estimators.active = options.estimator;
   config.estimators.compare = options.compare;
   config.safety.needs_attitude = options.estimator == MbbrEstimatorId::kKfAttitude;
-  if (config.world[level].gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;  // noiseless
+  if (config.world[level].common.gyro_sigma_rad_s == 0.0)
+    config.safety.max_identical_samples = 0;  // noiseless
   return config;
 }
 

@@ -18,9 +18,6 @@ namespace {
 
 constexpr double kTick_ms = 1e3 * kTickS;
 
-const WorldParams& common(const WorldParams& world) { return world; }
-const WorldParams& common(const MipWorldParams& world) { return world.common; }
-
 // Tipping by a positive angle about the axis; contact of wheel i: [T] (2.3)-(2.5), opposite its azimuth.
 const char* const kTipMbbr =
     "tip the robot by about 40 degrees towards +x, which is a ninth of a turn from wheel 1 on the way to "
@@ -76,7 +73,7 @@ Workbench::Workbench(const WorkbenchArguments& a) : robot_(robot_type(a.config))
     setup_.tip_axis_B = tip_axis(config.robot);
     setup_.motor = config.motor;
     setup_.calibration = config.calibration;
-    setup_.world = common(config.world[static_cast<std::size_t>(Fidelity::kFull)]);
+    setup_.world = config.world[static_cast<std::size_t>(Fidelity::kFull)].common;
     tip_words_ = words_for_tip(config.robot);
   });
   const Calibration& c = setup_.calibration;

@@ -1,5 +1,7 @@
 #include "common_config.hpp"
 
+#include <algorithm>
+
 namespace equipoise {
 
 std::string robot_type(const std::string& path) {
@@ -28,6 +30,7 @@ MotorParameters read_motor(Section s) {
   m.pwm_hz = s.number("pwm_hz", 100.0, 100e3);
   m.nominal_V = s.number("nominal_V", 1.0, 60.0);
   m.bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
+  if (s.has("invert_bridge")) m.invert_bridge = s.boolean("invert_bridge");  // logs before it: true
   s.finish();
   return m;
 }
@@ -94,7 +97,22 @@ AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m) {
   return p;
 }
 
-WorldParams read_world(Section s, BridgeType* bridge) {
+namespace {
+
+void read_disturbance(Section& s, WorldParams* w) {
+  w->stiction.static_ratio = s.number("static_ratio", 1.0, 5.0);
+  w->stiction.rate_rad_s = s.number("stribeck_rate_rad_s", 1e-3, 100.0);
+  w->diode_drop_V = s.number("diode_drop_V", 0.0, 3.0);
+  const int steps = static_cast<int>(std::lround(kTickS / w->step_s));
+  w->actuation_latency_steps = s.integer("actuation_latency_steps", 0, std::max(0, steps - 1));
+  w->sensor_latency_ticks = s.integer("sensor_latency_ticks", 0, 3);
+  w->imu_misalignment_rad = s.vector<3>("imu_misalignment_rad", -0.5, 0.5);
+  w->floor_slope_rad = s.vector<2>("floor_slope_rad", -0.3, 0.3);
+}
+
+}  // namespace
+
+WorldParams read_world(Section s, BridgeType* bridge, const std::function<void(Section&)>& rest) {
   WorldParams w;
   *bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
   w.step_s = s.number("step_s", 1e-5, kTickS);
@@ -121,6 +139,12 @@ WorldParams read_world(Section s, BridgeType* bridge) {
     push.force_W_N = row.vector<2>("force_N", -100.0, 100.0);
     row.finish();
     w.pushes.push_back(push);
+  }
+  if (s.has("disturbance")) {
+    Section disturbance = s.table("disturbance");
+    read_disturbance(disturbance, &w);
+    rest(disturbance);
+    disturbance.finish();
   }
   s.finish();
   return w;

@@ -2,6 +2,8 @@
 // ConfigError otherwise. Start-up only.
 #pragma once
 
+#include <functional>
+
 #include "equipoise/estimate/kalman.hpp"
 #include "toml_reader.hpp"
 
@@ -15,8 +17,10 @@ Calibration read_calibration(Section s, int wheels);
 SafetyParams read_safety(Section s);
 /// Of our own filter; `imu_position_m`: lever arm.
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m);
-/// All of a world but its process noise; `bridge`: what the simulated robot is built with.
-WorldParams read_world(Section s, BridgeType* bridge);
+/// All of a world but its process noise; `bridge`: what the simulated robot is built with. Its table
+/// `disturbance`, when there is one, is read by `rest` as well: what only this robot has.
+WorldParams read_world(
+    Section s, BridgeType* bridge, const std::function<void(Section&)>& rest = [](Section&) {});
 
 template <class Filter>
 void read_filter(Section s, typename Filter::Params& params) {

@@ -81,6 +81,26 @@ MbbrThesisFeedbackParams read_thesis(Section s) {
   return p;
 }
 
+void read_disturbance(Section& s, MbbrWorldParams* w) {
+  w->coulomb_scale = s.number("coulomb_scale", 0.0, 10.0);
+  w->extra_viscous_N_m_s = s.number("extra_viscous_N_m_s", 0.0, 1.0);
+  w->yaw_friction_scale = s.vector<2>("yaw_friction_scale", 0.0, 10.0);
+  w->drive.wheel_torque_scale = s.vector<3>("wheel_torque_scale", 0.0, 2.0);
+  w->drive.gear.play_rad = s.number("backlash_rad", 0.0, 0.5);
+  w->drive.gear.rotor_inertia_kg_m2 = s.number("rotor_inertia_kg_m2", 1e-8, 1.0);
+  w->drive.roller_tilt_rad = s.number("roller_tilt_rad", 0.0, 0.5);
+  w->drive.rollers_per_turn = s.number("rollers_per_turn", 1.0, 100.0);
+  w->drive.roller_slip_N_m = s.number("roller_slip_N_m", 0.0, 1.0);
+  w->drive.wheel_grip = s.number("wheel_grip", 0.0, 5.0);
+}
+
+MbbrWorldParams read_mbbr_world(Section s, BridgeType* bridge) {
+  MbbrWorldParams w;
+  w.process_noise_sigma = s.vector<10>("process_noise_variance", 0.0, 10.0).cwiseSqrt();
+  w.common = config::read_world(s, bridge, [&w](Section& d) { read_disturbance(d, &w); });
+  return w;
+}
+
 LoadedMbbr read_mbbr(const Document& document) {
   Section root(document, document.root(), "");
   LoadedMbbr loaded;
@@ -119,10 +139,7 @@ LoadedMbbr read_mbbr(const Document& document) {
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
-    Section level = world.table(kFidelityNames[i]);
-    const Vec<10> variance = level.vector<10>("process_noise_variance", 0.0, 10.0);
-    c.world[i] = config::read_world(level, &c.world_bridge[i]);
-    c.world[i].process_noise_sigma = variance.cwiseSqrt();
+    c.world[i] = read_mbbr_world(world.table(kFidelityNames[i]), &c.world_bridge[i]);
   }
   world.finish();
   root.finish();

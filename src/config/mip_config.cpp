@@ -74,8 +74,8 @@ MipWorldParams read_mip_world(Section s, BridgeType* bridge) {
   w.process_noise_sigma = s.vector<6>("process_noise_variance", 0.0, 10.0).cwiseSqrt();
   w.drivetrain.motor_gain = s.vector<2>("motor_gain", 0.1, 10.0);
   w.drivetrain.friction_gain = s.vector<2>("friction_gain", 0.0, 10.0);
-  w.drivetrain.backlash_rad = s.number("backlash_rad", 0.0, 0.5);
-  w.drivetrain.rotor_inertia_kg_m2 = s.number("rotor_inertia_kg_m2", 1e-7, 1.0);
+  w.drivetrain.gear.play_rad = s.number("backlash_rad", 0.0, 0.5);
+  w.drivetrain.gear.rotor_inertia_kg_m2 = s.number("rotor_inertia_kg_m2", 1e-7, 1.0);
   w.lift_at_s = s.number("lift_at_s", -1.0, 1e6);
   w.common = config::read_world(s, bridge);
   return w;

@@ -28,8 +28,8 @@ MbbrDynamics::MbbrDynamics(const MbbrParameters& p) noexcept
 // With c = (0, 0, l), alpha the ball's inertial angular acceleration (two components, yaw frame), S the map
 // phi' -> ball velocity / r, P = [e1 e2] and C = m_t [c]x R^T r S - I_w R^T P, Kane's equations are
 //   diag(body_inertia) Omega' + C alpha = b_body,   C^T Omega' + ball_inertia alpha = b_ball.
-MbbrAccelerations MbbrDynamics::accelerations(const MbbrMotion& m, const Vec3& tau_B,
-                                              const Vec3& push_B) const noexcept {
+MbbrAccelerations MbbrDynamics::accelerations(const MbbrMotion& m, const Vec3& tau_B, const Vec3& push_B,
+                                              const Vec2& pull_star) const noexcept {
   const Mat3 R = tilt_rotation(m);
   const Vec3& w = m.omega_B;
   const double ml = p_.m_t * p_.l;
@@ -52,7 +52,8 @@ MbbrAccelerations MbbrDynamics::accelerations(const MbbrMotion& m, const Vec3& t
   const Vec3 b_body = -w.cross(I_t.cwiseProduct(w)) + p_.l * Vec3(-on_body.y(), on_body.x(), 0.0) -
                       ml * kGravity_m_s2 * Vec3(-up_B.y(), up_B.x(), 0.0) - wheel_gyroscopic - tau_B;
   const Vec3 on_ball = wheel_gyroscopic + tau_B;
-  const Vec2 b_ball(-p_.r * e2.dot(on_body) + e1.dot(on_ball), p_.r * e1.dot(on_body) + e2.dot(on_ball));
+  const Vec2 b_ball(-p_.r * (e2.dot(on_body) + pull_star.y()) + e1.dot(on_ball),
+                    p_.r * (e1.dot(on_body) + pull_star.x()) + e2.dot(on_ball));
 
   const Vec3 inverse = body_inertia_.cwiseInverse();
   const Mat<3, 2> DC = inverse.asDiagonal() * C;

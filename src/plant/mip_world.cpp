@@ -61,18 +61,21 @@ Vec3 MipWorld::accelerations(const State& s, const Vec2& wheel_torque) const noe
   }
   Vec3 a = dynamics_.accelerations(motion(s), wheel_torque.sum(), wheel_torque.x() - wheel_torque.y());
   const Vec2 push_W = push_force_W(world_.common, time_s_);
-  if (!push_W.isZero(0.0)) {
+  const Vec2& slope = world_.common.floor_slope_rad;
+  if (!push_W.isZero(0.0) || !slope.isZero(0.0)) {
     // Force along the rolling direction at the centre of mass: power F (r (phi' + theta') + l cos theta'),
-    // with the axle's speed along -y.
+    // with the axle's speed along -y. On a slope the whole weight pulls the axle downhill.
+    const Vec2 weight_W = -(robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2 * slope;
     const double forward = -rotate(-s(kPsi), push_W).y();
+    const double downhill = -rotate(-s(kPsi), weight_W).y();
     const double c = std::cos(s(kTheta));
     const double lm = robot_.l * robot_.m_b;
     const double m22 = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;
     const double m12 = m22 + lm * robot_.r * c;
     const double m11 = robot_.I_b1 + robot_.l * lm + 2.0 * lm * robot_.r * c + m22;
     const double det = m11 * m22 - m12 * m12;
-    const double f1 = forward * (robot_.r + robot_.l * c);
-    const double f2 = forward * robot_.r;
+    const double f1 = forward * (robot_.r + robot_.l * c) + downhill * robot_.r;
+    const double f2 = (forward + downhill) * robot_.r;
     a(0) += (m22 * f1 - m12 * f2) / det;
     a(1) += (m11 * f2 - m12 * f1) / det;
   }
@@ -92,30 +95,22 @@ Vec2 MipWorld::friction_torque(const State& s) const noexcept {
   if (!world_.common.friction) return Vec2::Zero();
   const double h = world_.common.step_s;
   const State next = s + h * derivative(s, Vec2::Zero());
-  const Vec2 limit = robot_.mu_c * world_.drivetrain.friction_gain;
+  const Vec2 now = wheel_rates(s);
+  const Stiction& stiction = world_.common.stiction;
+  Vec2 limit = robot_.mu_c * world_.drivetrain.friction_gain;
+  limit = limit.cwiseProduct(Vec2(stiction.factor(now.x()), stiction.factor(now.y())));
   return coulomb_torque<2>(wheel_rates(next), mobility_, h, limit);
 }
 
 /// The motor's side of each gear over one step.
 void MipWorld::cross_backlash() noexcept {
-  const double half = 0.5 * world_.drivetrain.backlash_rad;
-  if (half == 0.0) return;
-  const double h = world_.common.step_s;
-  const Vec2 motor = motors_.torque(wheel_rates(s_) + play_rate_);
+  const GearPlayParams& gear = world_.drivetrain.gear;
+  if (gear.play_rad == 0.0) return;
+  const Vec2 rate(gears_[0].rate_rad_s(), gears_[1].rate_rad_s());
+  const Vec2 motor = motors_.torque(wheel_rates(s_) + rate);
   for (int i = 0; i < 2; ++i) {
-    const double side = motor(i) >= 0.0 ? half : -half;
-    if (play_(i) == side) {
-      engaged_(i) = 1.0;
-      play_rate_(i) = 0.0;
-      continue;
-    }
-    engaged_(i) = 0.0;
-    play_rate_(i) += h * motor(i) / world_.drivetrain.rotor_inertia_kg_m2;
-    play_(i) += h * play_rate_(i);
-    if (std::abs(play_(i)) >= half) {  // contact without rebound
-      play_(i) = std::copysign(half, play_(i));
-      play_rate_(i) = 0.0;
-    }
+    const bool touch = gears_[static_cast<std::size_t>(i)].step(gear, motor(i), world_.common.step_s);
+    engaged_(i) = touch ? 1.0 : 0.0;
   }
 }
 
@@ -125,11 +120,11 @@ void MipWorld::disturb() {
 }
 
 void MipWorld::advance(const MotorCommand& command) {
-  motors_.command(command);
   if (command.enable) held_ = false;
   const int steps = static_cast<int>(std::lround(kTickS / world_.common.step_s));
   for (int i = 0; i < steps && !held_; ++i) {
     const double h = world_.common.step_s;
+    if (i == world_.common.actuation_latency_steps) motors_.command(command);
     if (lifted()) {
       s_(kThetaDot) = s_(kTheta) < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
       s_(kPsiDot) = 0.0;
@@ -165,8 +160,8 @@ RawSample MipWorld::sense() {
     const Vec3 from_com = robot_.l_a - Vec3(0.0, 0.0, robot_.l);
     m.specific_force_B_m_s2 = -dynamics_.accelerometer_B(motion(s_), a, from_com);
   }
-  const Vec2 wheels = kinematics_.wheels(s_(kPhi), s_(kPsi)) + play_;
-  m.wheel_angle_rad = {wheels.x(), wheels.y()};
+  const Vec2 wheels = kinematics_.wheels(s_(kPhi), s_(kPsi));
+  m.wheel_angle_rad = {wheels.x() + gears_[0].ahead_rad(), wheels.y() + gears_[1].ahead_rad()};
   m.battery_V = motors_.battery_V();
   return sensors_.sense(m);
 }

@@ -29,6 +29,10 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
       accel_noise_(world.seed, kAccelNoise),
       encoder_noise_(world.seed, kEncoderNoise),
       attitude_noise_(world.seed, kAttitudeNoise) {
+  misaligned_ = !world.imu_misalignment_rad.isZero(0.0);
+  const double turn = world.imu_misalignment_rad.norm();
+  R_misaligned_ = misaligned_ ? Eigen::AngleAxisd(turn, world.imu_misalignment_rad / turn).toRotationMatrix()
+                              : Mat3::Identity();
   gyro_bias_ = start.gaussian_vector<3>(world.gyro_bias_sigma_rad_s);
   accel_bias_ = start.gaussian_vector<3>(world.accel_bias_sigma_m_s2);
   attitude_history_.fill(theta_rad);
@@ -46,9 +50,23 @@ void SimulatedSensors::attitude_packet(const Vec3& theta_rad) {
 }
 
 RawSample SimulatedSensors::sense(const TrueMotion& m) {
-  const Vec3 gyro = m.omega_B_rad_s + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
-  const Vec3 accel =
-      m.specific_force_B_m_s2 + accel_bias_ + accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
+  const auto late = std::min(static_cast<std::size_t>(world_.sensor_latency_ticks), samples_);
+  const RawSample now = sense_now(m);
+  sampled_[samples_ % kSampleDelay] = now;
+  RawSample raw = sampled_[(samples_ - late) % kSampleDelay];
+  ++samples_;
+  raw.t_ns = now.t_ns;
+  return raw;
+}
+
+RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
+  const auto as_mounted = [this](const Vec3& v) {
+    return misaligned_ ? Vec3(R_misaligned_.transpose() * v) : v;
+  };
+  const Vec3 gyro =
+      as_mounted(m.omega_B_rad_s) + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
+  const Vec3 accel = as_mounted(m.specific_force_B_m_s2) + accel_bias_ +
+                     accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
   attitude_packet(m.theta_rad);
 
   const auto counts = [this](double value, double per_count) {
@@ -79,7 +97,8 @@ RawSample SimulatedSensors::sense(const TrueMotion& m) {
   raw.battery_counts = counts(m.battery_V - calibration_.battery_offset_V, calibration_.battery_V_per_count);
   const auto delay = static_cast<std::size_t>(world_.attitude_latency_ticks);
   const Vec3 attitude = attitude_history_[(attitude_head_ + kAttitudeDelay - delay) % kAttitudeDelay];
-  const Eigen::Quaterniond q(rotation(quaternion_of(attitude)) * calibration_.R_BS);
+  const Mat3 R_WB = rotation(quaternion_of(attitude));  // as the chip believes itself to be mounted
+  const Eigen::Quaterniond q((misaligned_ ? Mat3(R_WB * R_misaligned_) : R_WB) * calibration_.R_BS);
   raw.attitude_wxyz = {q.w(), q.x(), q.y(), q.z()};
   raw.imu_ok = raw.encoders_ok = raw.battery_ok = raw.attitude_ok = true;
   return raw;

@@ -22,7 +22,7 @@ const std::string kMbbrBoard = kSource + "/config/boards/robotics_cape_mbbr.toml
 PracticeSetup mbbr_setup() {
   const MbbrConfig config = load_mbbr(kSource + "/config/mbbr.toml", {}).config;
   return {layout_of(config.robot, config.motor, config.calibration), Vec3::UnitY(), config.motor,
-          config.calibration, config.world[static_cast<std::size_t>(Fidelity::kFull)]};
+          config.calibration, config.world[static_cast<std::size_t>(Fidelity::kFull)].common};
 }
 
 PracticeSetup mip_setup() {

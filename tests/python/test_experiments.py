@@ -3,9 +3,12 @@
 import json
 import subprocess
 import sys
+import tomllib
 
+import numpy as np
 import pytest
-from equipoise_tools.experiments import coverage, framework
+from equipoise_tools.calibrate_disturbance import SEARCHED, Search, fragment
+from equipoise_tools.experiments import bridge_modes, coverage, framework
 from equipoise_tools.experiments.framework import Result
 from equipoise_tools.experiments.runs import summarise
 
@@ -94,3 +97,31 @@ def test_dmp_and_kf_outlast_the_printed_ekf_at_1_5_hz():
         )
         held[estimator] = summary["fell_at_s"] if summary["fell"] else summary["duration_s"]
     assert held["kf_attitude"] > held["ekf13_published"]
+
+
+@pytest.mark.parametrize("pwm_hz", [1000, 20000])
+def test_compensated_coasting_balances_the_edumip_as_braking_does(pwm_hz):
+    means = {
+        mode: sum(bridge_modes.variance(bridge_modes.MODES[mode], pwm_hz, seed) for seed in (1, 2))
+        for mode in ("brake", "coast, compensated")
+    }
+    assert means["coast, compensated"] == pytest.approx(means["brake"], rel=0.15)
+
+
+def test_the_strategy_of_the_calibration_finds_a_minimum():
+    target = np.linspace(0.2, 0.8, 6)
+    strategy = Search(np.full(6, 0.5), np.random.default_rng(1))
+    best = np.inf
+    for _ in range(60):
+        points = strategy.ask()
+        values = np.sum((points - target) ** 2 * np.arange(1, 7), axis=1)
+        strategy.tell(points, values, best)
+        best = min(best, values.min())
+    assert best < 1e-3
+
+
+def test_fragment_has_every_setting_once(tmp_path):
+    start = {key: begin for key, (_, _, begin) in SEARCHED.items()}
+    table = tomllib.loads(fragment(start, 0.0, "test"))
+    assert table["world"]["full"]["disturbance"]["imu_misalignment_rad"][2] == 0.0
+    assert len(table["estimator"]["ekf13_published"]["q"]) == 13

@@ -15,7 +15,7 @@ app::MbbrRigOptions ideal(std::uint64_t seed = 1) {
 
 MbbrConfig config_with_tilt(double sigma_rad) {
   MbbrConfig config = mbbr_config();
-  for (WorldParams& world : config.world) world.initial_tilt_rad = sigma_rad;
+  for (MbbrWorldParams& world : config.world) world.common.initial_tilt_rad = sigma_rad;
   return config;
 }
 

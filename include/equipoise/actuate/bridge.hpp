@@ -20,6 +20,7 @@ struct MotorParameters {
   double pwm_hz = 20e3;
   double nominal_V = 8.0;
   BridgeType bridge = BridgeType::kDriveCoast;
+  bool invert_bridge = true;  // false: a linear bridge's duty, whatever the bridge; [T] section 4.6
 
   double stall_current_A(double supply_V) const noexcept { return supply_V / resistance_ohm; }
   double no_load_rad_s(double supply_V) const noexcept { return supply_V / torque_constant_N_m_A; }
@@ -45,7 +46,7 @@ class Bridge {
   /// `u`: duty of a linear bridge at nominal voltage.
   double invert(double u, double wheel_rate_rad_s, double supply) const noexcept {
     const double scaled = u * motor_.nominal_V / supply;
-    if (motor_.bridge == BridgeType::kDriveBrake) return saturate(scaled);
+    if (motor_.bridge == BridgeType::kDriveBrake || !motor_.invert_bridge) return saturate(scaled);
     const double omega_r = wheel_rate_rad_s / motor_.no_load_rad_s(supply);
     if (!std::isfinite(scaled - omega_r)) return scaled - omega_r;  // for the safety gate to see
     return drive_coast_invert(T_r_, std::clamp(omega_r, -1.0, 1.0), scaled - omega_r).u;

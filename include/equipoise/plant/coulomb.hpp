@@ -5,17 +5,32 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "equipoise/types.hpp"
 
 namespace equipoise {
 
-/// Axes that do not influence each other; `mobility`: 1/effective inertia of each.
+/// Stribeck: breaking away takes more than keeping moving.
+struct Stiction {
+  double static_ratio = 1.0;  // breakaway over Coulomb friction; 1: the same
+  double rate_rad_s = 0.5;    // where the difference has fallen to 1/e
+
+  /// Friction at `rate` over Coulomb friction.
+  double factor(double rate) const noexcept {
+    if (static_ratio == 1.0) return 1.0;
+    const double slow = rate / rate_rad_s;
+    return 1.0 + (static_ratio - 1.0) * std::exp(-slow * slow);
+  }
+};
+
+/// Axes that do not influence each other, each with its own limit; `mobility`: 1/effective inertia of each.
 template <int N>
-Vec<N> coulomb_torque(const Vec<N>& free_rate, const Vec<N>& mobility, double step_s, double mu_c) noexcept {
+Vec<N> uncoupled_coulomb_torque(const Vec<N>& free_rate, const Vec<N>& mobility, double step_s,
+                                const Vec<N>& mu_c) noexcept {
   Vec<N> tau;
   for (int i = 0; i < N; ++i) {
-    tau(i) = std::clamp(-free_rate(i) / (step_s * mobility(i)), -mu_c, mu_c);
+    tau(i) = std::clamp(-free_rate(i) / (step_s * mobility(i)), -mu_c(i), mu_c(i));
   }
   return tau;
 }

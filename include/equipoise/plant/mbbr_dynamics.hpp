@@ -46,9 +46,10 @@ class MbbrDynamics {
  public:
   explicit MbbrDynamics(const MbbrParameters& p) noexcept;
 
-  /// `tau_B`: torque on the ball; `push_B`: force on the body's centre of mass, N.
-  MbbrAccelerations accelerations(const MbbrMotion& m, const Vec3& tau_B,
-                                  const Vec3& push_B = Vec3::Zero()) const noexcept;
+  /// `tau_B`: torque on the ball; `push_B`: force on the body's centre of mass, N; `pull_star`: force on the
+  /// ball's centre, yaw frame, N.
+  MbbrAccelerations accelerations(const MbbrMotion& m, const Vec3& tau_B, const Vec3& push_B = Vec3::Zero(),
+                                  const Vec2& pull_star = Vec2::Zero()) const noexcept;
 
   /// Ball rate relative to the body, body axes: what the encoders see. [T] (5.10)
   static Vec3 encoder_rate_B(const MbbrMotion& m) noexcept;

@@ -4,16 +4,29 @@
 // most mu_c. Simulation only; allocates nothing after construction; same seed, same bytes.
 #pragma once
 
+#include "equipoise/plant/mbbr_drive.hpp"
 #include "equipoise/plant/mbbr_dynamics.hpp"
-#include "equipoise/plant/motors.hpp"
 #include "equipoise/plant/sensors.hpp"
 
 namespace equipoise {
 
+struct MbbrWorldParams {
+  WorldParams common;
+  MbbrDriveParams drive;
+  double coulomb_scale = 1.0;        // of the identified friction
+  double extra_viscous_N_m_s = 0.0;  // support balls, rollers
+  Vec2 yaw_friction_scale{1.0,
+                          1.0};  // Coulomb about z for positive and negative spin of the ball in the body
+  Vec<10> process_noise_sigma = Vec<10>::Zero();  // per tick: theta x y z, phi x y, and their rates
+};
+
+/// Largest friction torque about each body axis at these relative rates.
+Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept;
+
 class MbbrWorld {
  public:
   MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor, const Calibration& calibration,
-            const WorldParams& world);
+            const MbbrWorldParams& world);
 
   /// Advances one tick with the bridges as commanded.
   void advance(const MotorCommand& command);
@@ -30,18 +43,22 @@ class MbbrWorld {
   /// Attitude, body rates, ball rates, ball angles (inertial), relative ball angle; 3 + 3 + 2 + 2 + 3.
   using State = Vec<13>;
   static MbbrMotion motion(const State& s) noexcept;
+  MbbrAccelerations accelerations(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
   State derivative(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
-  Vec3 motor_torque_B(const Vec3& relative_rate_B) const noexcept;
   Vec3 coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept;
-  Vec2 push_now() const noexcept { return push_force_W(world_, time_s_); }
+  Vec3 viscous_torque_B(const Vec3& relative_rate_B) const noexcept;
+  Vec2 slope_pull_star(double theta_z) const noexcept;
+  Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
+  void step(double h) noexcept;
   void disturb();
 
   MbbrParameters robot_;
-  WorldParams world_;
+  MbbrWorldParams world_;
   MbbrKinematics kinematics_;
   MbbrDynamics dynamics_;
   Vec3 mobility_;
-  SimulatedMotors<Mbbr::kWheels> motors_;
+  MbbrDrive::Motors motors_;
+  MbbrDrive drive_;
   NoiseStream start_noise_, process_noise_;
   State s_;
   SimulatedSensors sensors_;

@@ -5,6 +5,9 @@
 // construction; same seed, same bytes.
 #pragma once
 
+#include <array>
+
+#include "equipoise/plant/gear_play.hpp"
 #include "equipoise/plant/mip_dynamics.hpp"
 #include "equipoise/plant/motors.hpp"
 #include "equipoise/plant/sensors.hpp"
@@ -15,8 +18,7 @@ namespace equipoise {
 struct MipDrivetrain {
   Vec2 motor_gain = Vec2::Ones();     // torque of each motor over nominal
   Vec2 friction_gain = Vec2::Ones();  // Coulomb friction of each gear over nominal
-  double backlash_rad = 0.0;          // full play at the wheel
-  double rotor_inertia_kg_m2 = 2e-5;  // at the wheel; the part of I_w1 that crosses the play
+  GearPlayParams gear;
 };
 
 struct MipWorldParams {
@@ -66,9 +68,8 @@ class MipWorld {
   SimulatedSensors sensors_;
   double time_s_ = 0.0;
   bool held_ = true;
-  Vec2 play_ = Vec2::Zero();       // motor ahead of its wheel, within +- half the backlash
-  Vec2 play_rate_ = Vec2::Zero();  // while crossing
-  Vec2 engaged_ = Vec2::Ones();    // 1: teeth in contact
+  std::array<GearPlay, Mip::kWheels> gears_;
+  Vec2 engaged_ = Vec2::Ones();  // 1: teeth in contact
 };
 
 }  // namespace equipoise

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/plant/diode_drop.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/samples.hpp"
 
@@ -19,6 +20,7 @@ class SimulatedMotors {
         calibration_(calibration),
         open_V_(world.battery_V),
         resistance_ohm_(world.battery_resistance_ohm),
+        diode_drop_V_(world.diode_drop_V),
         battery_V_(world.battery_V) {}
 
   void command(const MotorCommand& command) noexcept {
@@ -37,10 +39,7 @@ class SimulatedMotors {
     for (int i = 0; i < N; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const double omega_r = wheel_rate_rad_s(i) / no_load;
-      const double current = motor_.bridge == BridgeType::kDriveBrake
-                                 ? calibration_.motor_sign[k] * command_.duty[k] - omega_r
-                                 : held_[k].mean_current(omega_r);
-      torque(i) = stall_torque * current;
+      torque(i) = stall_torque * current_over_stall(k, omega_r);
     }
     return torque;
   }
@@ -59,10 +58,19 @@ class SimulatedMotors {
   }
 
  private:
+  double current_over_stall(std::size_t k, double omega_r) const noexcept {
+    const double duty = calibration_.motor_sign[k] * command_.duty[k];
+    if (motor_.bridge == BridgeType::kDriveBrake) return duty - omega_r;
+    if (diode_drop_V_ == 0.0) return held_[k].mean_current(omega_r);
+    const double opposing = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
+    return drive_coast_mean_current_with_drop(motor_.T_r(), omega_r, duty, opposing);
+  }
+
   MotorParameters motor_;
   Calibration calibration_;
   double open_V_;
   double resistance_ohm_;
+  double diode_drop_V_;
   double battery_V_;
   MotorCommand command_;
   std::array<DriveCoastCommand, N> held_{};  // the integrator asks at many speeds per command

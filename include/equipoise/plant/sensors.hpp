@@ -39,9 +39,11 @@ class SimulatedSensors {
   SimulatedSensors(const Calibration& calibration, const WorldParams& world, int wheels, NoiseStream& start,
                    const Vec3& theta_rad);
 
+  /// What the devices report; late by the world's latency, stamped with the time of asking.
   RawSample sense(const TrueMotion& m);
 
  private:
+  RawSample sense_now(const TrueMotion& m);
   void attitude_packet(const Vec3& theta_rad);
 
   Calibration calibration_;
@@ -49,10 +51,15 @@ class SimulatedSensors {
   std::size_t wheels_;
   NoiseStream gyro_noise_, accel_noise_, encoder_noise_, attitude_noise_;
   Vec3 gyro_bias_, accel_bias_;
+  bool misaligned_;
+  Mat3 R_misaligned_;
   Vec3 attitude_error_ = Vec3::Zero();
   static constexpr std::size_t kAttitudeDelay = 16;
   std::array<Vec3, kAttitudeDelay> attitude_history_{};
   std::size_t attitude_head_ = 0;
+  static constexpr std::size_t kSampleDelay = 4;
+  std::array<RawSample, kSampleDelay> sampled_{};
+  std::size_t samples_ = 0;
 };
 
 /// Sum of the pushes that act at `time_s`, N.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/plant/coulomb.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "equipoise/types.hpp"
 
@@ -28,8 +29,6 @@ struct WorldParams {
 
   double initial_tilt_rad = 0.02;  // sigma about each axis, and of the heading
   bool friction = true;
-  /// Share of the filter's process noise that disturbs the body each tick, [T] section 6.3.
-  Vec<10> process_noise_sigma = Vec<10>::Zero();  // theta x y z, phi x y, and their rates
 
   double gyro_sigma_rad_s = 0.0;
   double accel_sigma_m_s2 = 0.0;
@@ -48,6 +47,14 @@ struct WorldParams {
   int attitude_latency_ticks = 0;
 
   std::vector<Push> pushes;
+
+  /// What a robot has and its model leaves out; the defaults: nothing.
+  Stiction stiction;
+  double diode_drop_V = 0.0;        // V_d of each of the two diodes that carry the current back; drive/coast
+  int actuation_latency_steps = 0;  // until the bridges follow
+  int sensor_latency_ticks = 0;     // of a whole sample
+  Vec3 imu_misalignment_rad = Vec3::Zero();  // rotation vector, body axes: mount against calibration
+  Vec2 floor_slope_rad = Vec2::Zero();       // rise towards world x, y
 };
 
 }  // namespace equipoise

@@ -18,9 +18,9 @@ std::int64_t monotonicNow() {
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
 }
 
-equipoise::WorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
-  equipoise::WorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kFull)];
-  params.seed = seed;
+equipoise::MbbrWorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
+  equipoise::MbbrWorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kFull)];
+  params.common.seed = seed;
   return params;
 }
 }  // namespace
