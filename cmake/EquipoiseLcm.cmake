@@ -15,4 +15,6 @@ add_custom_target(equipoise_lcm_generate DEPENDS ${lcm_stamp})
 add_library(equipoise_lcm_types INTERFACE)
 target_include_directories(equipoise_lcm_types SYSTEM INTERFACE ${lcm_out}/cpp)
 target_link_libraries(equipoise_lcm_types INTERFACE PkgConfig::LCM)
+# lcm-gen's code reads and writes doubles through int64_t*.
+target_compile_options(equipoise_lcm_types INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-strict-aliasing>)
 add_dependencies(equipoise_lcm_types equipoise_lcm_generate)

@@ -74,7 +74,8 @@ Realtime::Realtime(const RealtimeWish& wish) {
     const std::int32_t microseconds = 0;
     const bool held = cpu_latency_fd_ >= 0 &&
                       write(cpu_latency_fd_, &microseconds, sizeof microseconds) == sizeof microseconds;
-    set(kCpuLatency, held ? 0 : errno);
+    // Without the device the kernel has no idle states to forbid.
+    if (held || errno != ENOENT) set(kCpuLatency, held ? 0 : errno);
   }
   if (wish.priority > 0) {
     sched_param scheduling{};
