@@ -71,6 +71,7 @@ struct Arguments {
   int silent_ticks = 2;
   int priority = runtime::kGuardPriority;
   int parent = 0;
+  int complain_fd = STDERR_FILENO;
 };
 
 std::unique_ptr<Bridges> bridges_of(const Arguments& a) {
@@ -88,7 +89,13 @@ bool follow(int parent) {
 
 int run(const Arguments& a) {
   watch_interrupts();
-  const auto bridges = bridges_of(a);
+  std::unique_ptr<Bridges> bridges;
+  try {
+    bridges = bridges_of(a);
+  } catch (const std::runtime_error& error) {
+    if (a.complain_fd == STDERR_FILENO) throw;
+    return write(a.complain_fd, error.what(), std::strlen(error.what())) < 0 ? 2 : 1;
+  }
   if (a.parent != 0 && !follow(a.parent)) return 0;
   runtime::SharedHeartbeat heartbeat(a.heartbeat, runtime::SharedHeartbeat::Role::kGuard);
   runtime::RealtimeWish wish;
@@ -132,6 +139,8 @@ void add_guard(CLI::App& app, int* status) {
       ->check(CLI::Range(0, 99));
   command->add_option("--parent", a->parent,
                       "end with this process, whose child this is (run starts its own)");
+  command->add_option("--complain-fd", a->complain_fd,
+                      "where to say why it cannot start (run passes a pipe)");
   command->callback([=] { *status = run(*a); });
 }
 

@@ -1,10 +1,13 @@
 #include "guard_process.hpp"
 
+#include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstring>
@@ -29,7 +32,31 @@ std::vector<char*> environment() {
   return variables;
 }
 
-pid_t spawn(std::vector<std::string> arguments) {
+constexpr int kComplaints = 3;  // the child's file descriptor
+
+/// What the guard said before it ended.
+std::string text_of(int fd) {
+  std::array<char, 512> text{};
+  const ssize_t size = read(fd, text.data(), text.size());
+  return size > 0 ? std::string(text.data(), static_cast<std::size_t>(size))
+                  : "the guard ended without a word";
+}
+
+/// Both ends closed at the end, and in every child but by its own number.
+struct Pipe {
+  Pipe() {
+    if (pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0)
+      throw std::runtime_error(std::string("no pipe for the guard: ") + std::strerror(errno));
+  }
+  ~Pipe() {
+    for (const int fd : ends) close(fd);
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  std::array<int, 2> ends{};
+};
+
+pid_t spawn(std::vector<std::string> arguments, int complaints) {
   std::vector<char*> argv(arguments.size());
   std::transform(arguments.begin(), arguments.end(), argv.begin(), [](std::string& a) { return a.data(); });
   argv.push_back(nullptr);
@@ -38,9 +65,13 @@ pid_t spawn(std::vector<std::string> arguments) {
   // A group of its own: Ctrl-C in the terminal is for the loop, which then stops the guard.
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_adddup2(&files, complaints, kComplaints);
   pid_t pid = 0;
   const int error =
-      posix_spawn(&pid, "/proc/self/exe", nullptr, &attributes, argv.data(), environment().data());
+      posix_spawn(&pid, "/proc/self/exe", &files, &attributes, argv.data(), environment().data());
+  posix_spawn_file_actions_destroy(&files);
   posix_spawnattr_destroy(&attributes);
   if (error != 0)
     throw std::runtime_error(std::string("the guard cannot be started: ") + std::strerror(error));
@@ -51,11 +82,17 @@ pid_t spawn(std::vector<std::string> arguments) {
 
 GuardProcess::GuardProcess(const std::string& board_path, double tick_ms) {
   const std::string name = std::string(runtime::kDefaultHeartbeat) + "-" + std::to_string(getpid());
+  const Pipe complaints;
   pid_ = spawn({"equipoise", "guard", "--board", board_path, "--heartbeat", name, "--period-ms",
-                std::to_string(tick_ms), "--parent", std::to_string(getpid())});
+                std::to_string(tick_ms), "--parent", std::to_string(getpid()), "--complain-fd",
+                std::to_string(kComplaints)},
+               complaints.ends[1]);
   for (int i = 0; i < kStartPolls; ++i) {
     int status = 0;
-    if (ended(&status)) throw std::runtime_error("the guard did not come up (its reason is above)");
+    if (ended(&status)) {
+      throw std::runtime_error(board_path + ": " + text_of(complaints.ends[0]) +
+                               " (equipoise doctor --board " + board_path + " finds the cause)");
+    }
     try {
       if (page_ == nullptr)
         page_ = std::make_unique<runtime::SharedHeartbeat>(name, runtime::SharedHeartbeat::Role::kLoop);

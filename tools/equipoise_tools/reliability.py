@@ -187,14 +187,12 @@ def blackbox(_: argparse.Namespace) -> Part:
     )
 
 
-def sanitizers(options: argparse.Namespace) -> Part:
+def sanitizers(_: argparse.Namespace) -> Part:
     part = Part()
     for preset, what in (
         ("sanitize", "AddressSanitizer, UndefinedBehaviorSanitizer"),
         ("tsan", "ThreadSanitizer"),
     ):
-        if not options.sanitizers:
-            break
         targets = ("unit_tests", "app_tests", "driver_tests", "runtime_tests", "equipoise")
         output("cmake", "--preset", preset)
         output("cmake", "--build", f"build/{preset}", "--target", *targets)
@@ -242,14 +240,14 @@ def main() -> int:
         "--fuzz-runs", type=int, default=FUZZ_EXECUTIONS, help="per target (default 10 million)"
     )
     parser.add_argument(
-        "--no-sanitizers", dest="sanitizers", action="store_false", help="leave these builds out"
+        "--skip", action="append", default=[], choices=PARTS, help="leave this part out; the page says so"
     )
     options = parser.parse_args()
     unknown = [name for name in options.parts if name not in PARTS]
     if unknown:
         parser.error(f"no part {', '.join(unknown)}; there are: {', '.join(PARTS)}")
     rows, sections = [], []
-    for name in options.parts or PARTS:
+    for name in options.parts or [name for name in PARTS if name not in options.skip]:
         print(f"{name} ...", file=sys.stderr, flush=True)
         part = PARTS[name](options)
         rows += part.rows
@@ -261,7 +259,8 @@ def main() -> int:
     )
     arguments = "".join(f" {argument}" for argument in sys.argv[1:])
     head = HEAD.format(arguments=arguments, cpus=os.cpu_count(), kernel=os.uname().release)
-    page = head + table + "\n" + "\n".join(section for section in sections if section)
+    left_out = f"\nNot measured this time: {', '.join(options.skip)}.\n" if options.skip else ""
+    page = head + table + left_out + "\n" + "\n".join(section for section in sections if section)
     if options.parts:
         print(page)
     else:

@@ -44,7 +44,8 @@ class TimeHistogram {
 
   static constexpr std::int64_t upper_ns(std::size_t bin) noexcept {
     const std::int64_t octave = std::int64_t{1024} << (bin / kBinsPerOctave);
-    return octave + octave * static_cast<std::int64_t>(bin % kBinsPerOctave) / kBinsPerOctave;
+    return octave + octave * static_cast<std::int64_t>(bin % kBinsPerOctave) /
+                        static_cast<std::int64_t>(kBinsPerOctave);
   }
 
  private:
