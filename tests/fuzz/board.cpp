@@ -1,6 +1,8 @@
 // Any text is a board the drivers can be given, or a ConfigError.
 #include "app/board.hpp"
 
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 

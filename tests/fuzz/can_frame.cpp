@@ -1,4 +1,6 @@
 // Any frame, error frames included, leaves the port in one of its four states.
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 

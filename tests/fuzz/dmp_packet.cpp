@@ -1,5 +1,7 @@
 // Any packet is refused or holds a unit quaternion.
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 
 #include "dmp.h"

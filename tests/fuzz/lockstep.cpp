@@ -1,6 +1,9 @@
 // Any packet is refused or becomes counts.
 #include "app/lockstep.hpp"
 
+#include <cstddef>
+#include <cstdint>
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   equipoise::lockstep_sensors_t sensors;
   if (equipoise::app::decode_lockstep_sensors(data, size, &sensors)) {

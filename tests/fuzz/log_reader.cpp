@@ -1,4 +1,6 @@
 // Any file is a run's log, whole ticks only, or an InputError.
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 
 #include "app/commands.hpp"

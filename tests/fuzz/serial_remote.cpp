@@ -1,4 +1,6 @@
 // No bytes on the serial line or the CAN bus that were not signed are ever a command.
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 
 #include "equipoise/runtime/command_auth.hpp"
