@@ -108,7 +108,7 @@ nlohmann::json bench_wake(const Arguments& a) {
   runtime::Supervisor supervisor({}, &page, 0);
   std::vector<std::int64_t> ours;
   std::vector<std::int64_t> bare;
-  for (auto* late : {&ours, &bare}) late->reserve(static_cast<std::size_t>(2 * a.wakes));
+  for (auto* late : {&ours, &bare}) late->reserve(2 * static_cast<std::size_t>(a.wakes));
   std::int64_t due_ns = runtime::monotonic_now_ns() + kPeriod_ns;
   for (int i = 0; i < 2 * a.wakes; ++i) {
     const bool is_ours = i / kTurn % 2 == 0;

@@ -133,8 +133,9 @@ BenchLog read_csv(const std::string& path) {
       char* end = nullptr;
       sample.*kFields[f] = std::strtod(cell.c_str(), &end);
       if (cell.empty() || *end != '\0') {
-        throw InputError(path + ":" + std::to_string(number) + ": " + kNames[f] + ": \"" + cell +
-                         "\" is not a number");
+        std::string where = path;
+        where.append(":").append(std::to_string(number)).append(": ").append(kNames[f]);
+        throw InputError(where.append(": \"").append(cell).append("\" is not a number"));
       }
     }
     append(path, sample, &log);

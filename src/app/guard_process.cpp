@@ -90,8 +90,10 @@ GuardProcess::GuardProcess(const std::string& board_path, double tick_ms) {
   for (int i = 0; i < kStartPolls; ++i) {
     int status = 0;
     if (ended(&status)) {
-      throw std::runtime_error(board_path + ": " + text_of(complaints.ends[0]) +
-                               " (equipoise doctor --board " + board_path + " finds the cause)");
+      std::string what = board_path;
+      what.append(": ").append(text_of(complaints.ends[0]));
+      throw std::runtime_error(
+          what.append(" (equipoise doctor --board ").append(board_path).append(" finds the cause)"));
     }
     try {
       if (page_ == nullptr)

@@ -55,7 +55,6 @@ struct Outcome {
   std::string end;    // finished, duration, interrupted, fell, peer_gone, timeout, protocol, device, log
   std::string error;  // one line; empty when nothing went wrong
   std::string log;
-  nlohmann::json watch;  // guard, realtime, timing; null: nobody watched
 };
 
 /// run.lcm, run-2.lcm, run-3.lcm: a new engine is a new flight.
@@ -137,7 +136,7 @@ class Runner {
 };
 
 nlohmann::json to_json(const Arguments& a, const std::string& robot, const Outcome& o, int flights,
-                       const std::string& sha256) {
+                       const std::string& sha256, const nlohmann::json& watch) {
   const Flight& f = o.flight;
   nlohmann::json out{{"robot", robot},
                      {"backend", a.backend},
@@ -158,11 +157,13 @@ nlohmann::json to_json(const Arguments& a, const std::string& robot, const Outco
                      {"log", o.log},
                      {"config_sha256", sha256},
                      {"version", version()}};
-  if (!o.watch.is_null()) out.update(o.watch);
+  if (!watch.is_null()) out.update(watch);
   return out;
 }
 
-int report(const Arguments& a, const std::string& robot, Outcome o, int flights, const std::string& sha256) {
+/// `watch`: guard, realtime, timing; null: nobody watched.
+int report(const Arguments& a, const std::string& robot, Outcome o, int flights, const std::string& sha256,
+           const nlohmann::json& watch = nullptr) {
   const Flight& f = o.flight;
   if (o.error.empty() && f.fell)
     o.error = "the motors went off at " + std::to_string(f.fell_at_s) + " s: " + reasons_text(f.reasons);
@@ -175,7 +176,7 @@ int report(const Arguments& a, const std::string& robot, Outcome o, int flights,
                          : "Never armed",
                f.duration_s(), a.backend.c_str(), a.choice.estimator.c_str(), a.choice.controller.c_str());
   std::fprintf(out, "  duty max        %8.3f\n  log             %s\n", f.duty_max, o.log.c_str());
-  if (!a.json.empty()) write_json(to_json(a, robot, o, flights, sha256), a.json);
+  if (!a.json.empty()) write_json(to_json(a, robot, o, flights, sha256, watch), a.json);
   if (o.error.empty()) return 0;
   std::fprintf(stderr, "equipoise: %s; motors are off\n", o.error.c_str());
   return 1;
@@ -250,10 +251,9 @@ int run_board(const Arguments& a, const Board& board, const std::string& board_t
   Announcer announcer(board);
   Outcome outcome = runner.fly_once(io, 1, &announcer,
                                     [&](auto&& fly) { return watch.fly(std::forward<decltype(fly)>(fly)); });
-  outcome.watch = watch.summary();
   if (outcome.end == "device")
     outcome.error = std::string("the board's tick failed: ") + std::strerror(-outcome.flight.error);
-  return report(a, Firmware::kName, outcome, 1, runner.sha256());
+  return report(a, Firmware::kName, outcome, 1, runner.sha256(), watch.summary());
 }
 
 int run(Arguments a) {

@@ -113,9 +113,12 @@ void apply_includes(toml::table& root, const std::string& path) {
   for (const toml::node& node : *files) names.push_back(node.as_string()->get());
   root.erase("include");
   for (const std::string& name : names) {
-    const std::string fragment = name.rfind('/', 0) == 0 ? name : folder + name;
+    std::string fragment = name.rfind('/', 0) == 0 ? "" : folder;
+    fragment += name;
     std::ifstream file(fragment);
-    if (!file) throw ConfigError(path + ": include: " + fragment + ": cannot be opened");
+    if (!file)
+      throw ConfigError(
+          std::string(path).append(": include: ").append(fragment).append(": cannot be opened"));
     merge(root, parsed(file, fragment), fragment, "");
   }
 }
