@@ -40,7 +40,7 @@ LoopEnd run_loop(Io& io, Pipeline& pipeline, Commands&& commands, Observer&& obs
     observe(end.ticks, now_ns, raw, command, result);
     ++end.ticks;
   }
-  io.motors_off();
+  supervisor.end(false, io.motors_off());  // the guard need not wait for our silence
   return end;
 }
 
