@@ -112,8 +112,10 @@ int Lockstep::stop(LockstepEnd end, int code, const std::string& why) {
 }
 
 bool decode_lockstep_sensors(const void* data, std::size_t size, lockstep_sensors_t* out) {
+  constexpr std::int64_t kLastStep = INT64_MAX / 5'000'000;  // its time in ns still fits
   const auto length = static_cast<int>(size);
-  return size <= kLargestMessage && length == out->getEncodedSize() && out->decode(data, 0, length) == length;
+  return size <= kLargestMessage && length == out->getEncodedSize() &&
+         out->decode(data, 0, length) == length && out->step >= -kLastStep && out->step <= kLastStep;
 }
 
 int Lockstep::receive() {
