@@ -94,7 +94,8 @@ int run(const Arguments& a) {
     bridges = bridges_of(a);
   } catch (const std::runtime_error& error) {
     if (a.complain_fd == STDERR_FILENO) throw;
-    return write(a.complain_fd, error.what(), std::strlen(error.what())) < 0 ? 2 : 1;
+    (void)!write(a.complain_fd, error.what(), std::strlen(error.what()));
+    return 1;
   }
   if (a.parent != 0 && !follow(a.parent)) return 0;
   runtime::SharedHeartbeat heartbeat(a.heartbeat, runtime::SharedHeartbeat::Role::kGuard);

@@ -80,12 +80,11 @@ pid_t spawn(std::vector<std::string> arguments, int complaints) {
 
 }  // namespace
 
-GuardProcess::GuardProcess(const std::string& board_path, double tick_ms) {
+GuardProcess::GuardProcess(const std::string& board_path) {
   const std::string name = std::string(runtime::kDefaultHeartbeat) + "-" + std::to_string(getpid());
   const Pipe complaints;
-  pid_ = spawn({"equipoise", "guard", "--board", board_path, "--heartbeat", name, "--period-ms",
-                std::to_string(tick_ms), "--parent", std::to_string(getpid()), "--complain-fd",
-                std::to_string(kComplaints)},
+  pid_ = spawn({"equipoise", "guard", "--board", board_path, "--heartbeat", name, "--parent",
+                std::to_string(getpid()), "--complain-fd", std::to_string(kComplaints)},
                complaints.ends[1]);
   for (int i = 0; i < kStartPolls; ++i) {
     int status = 0;

@@ -1,5 +1,5 @@
 // The guard of one flight: a child process that holds the bridge enables of a board and its heartbeat page.
-// In: board file, tick -> out: the page to beat on; runtime_error when it does not come up. It ends with this
+// In: board file -> out: the page to beat on; runtime_error when it does not come up. It ends with this
 // process, whatever ends that. Start-up only; create it before threads, and before the board is opened.
 #pragma once
 
@@ -14,7 +14,7 @@ namespace equipoise::app {
 
 class GuardProcess {
  public:
-  GuardProcess(const std::string& board_path, double tick_ms);
+  explicit GuardProcess(const std::string& board_path);
   ~GuardProcess();  // tells it to switch off and waits for that
   GuardProcess(const GuardProcess&) = delete;
   GuardProcess& operator=(const GuardProcess&) = delete;

@@ -339,11 +339,6 @@ void add_run(CLI::App& app, int* status) {
                    "board: the loop's SCHED_FIFO priority, below the guard's")
       ->capture_default_str()
       ->check(CLI::Range(1, runtime::kGuardPriority - 1));
-  command
-      ->add_option("--slow-motion", a->watch.slow_motion,
-                   "emulated board: every deadline this many times as long")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 200.0));
   command->add_option("--telemetry", a->telemetry, "LCM provider URL, or off")->capture_default_str();
   command->callback([=] {
     if (arm->count() == 0) a->arm = a->backend == "lockstep";

@@ -42,11 +42,7 @@ class Robot {
     });
   }
   const std::optional<command_session_t>& session() const { return session_; }
-  void send(const signed_command_t& message) {
-    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    wire_->say(bytes.data(), bytes.size());
-  }
+  void send(const signed_command_t& message) { runtime::say(*wire_, message); }
   double interval_s() const { return wire_->interval_s(); }
 
  private:

@@ -44,8 +44,6 @@ struct Stillness {
 
 class Session {
  public:
-  static constexpr std::int64_t kGuardSilent_ns = 30'000'000;  // as the flight's supervisor
-
   /// `heartbeat`: of the guard that holds the bridges; nullptr: nobody does.
   Session(rio_t io, Ask ask, runtime::HeartbeatPage* heartbeat = nullptr)
       : hardware_(io), io_(io), ask_(std::move(ask)), heartbeat_(heartbeat) {}
@@ -75,7 +73,7 @@ class Session {
   rio_t io_;
   Ask ask_;
   runtime::HeartbeatPage* heartbeat_;
-  runtime::BeatWatch guard_{kGuardSilent_ns};
+  runtime::BeatWatch guard_{runtime::kGuardSilent_ns};
   double temperature_degC_ = 0.0;
 };
 

@@ -3,16 +3,10 @@
 #include <cstdio>
 
 namespace equipoise::app {
-namespace {
-
-constexpr double kTick_ms = 1e3 * kTickS;
-
-}  // namespace
 
 FlightWatch::FlightWatch(const WatchOptions& options) : options_(options) {
-  policy_.period_ns = static_cast<std::int64_t>(1e6 * kTick_ms * options.slow_motion);
   if (options.guard) {
-    guard_ = std::make_unique<GuardProcess>(options.board_path, kTick_ms * options.slow_motion);
+    guard_ = std::make_unique<GuardProcess>(options.board_path);
   } else {
     std::fprintf(
         stderr,

@@ -20,7 +20,6 @@ struct WatchOptions {
   bool realtime = true;                   // false: fly without, loudly
   int cpu = -1;                           // -1: wherever the kernel likes
   int priority = runtime::kLoopPriority;  // SCHED_FIFO
-  double slow_motion = 1.0;               // emulated hardware: every deadline this many times as long
 };
 
 class FlightWatch {
@@ -32,7 +31,7 @@ class FlightWatch {
   auto fly(F&& f) {
     const runtime::Realtime realtime(begin());
     note(realtime);
-    runtime::Supervisor supervisor(policy_, guard_ ? &guard_->page() : nullptr, standing_);
+    runtime::Supervisor supervisor({}, guard_ ? &guard_->page() : nullptr, standing_);
     auto result = f(supervisor);
     note(supervisor.timing());
     return result;
@@ -47,7 +46,6 @@ class FlightWatch {
   void note(const runtime::LoopTiming& timing);
 
   WatchOptions options_;
-  runtime::OverrunPolicy policy_;
   std::unique_ptr<GuardProcess> guard_;
   std::uint32_t standing_ = 0;
   nlohmann::json summary_;

@@ -16,8 +16,6 @@
 namespace equipoise::app {
 namespace {
 
-constexpr double kTick_ms = 1e3 * kTickS;
-
 // Tipping by a positive angle about the axis; contact of wheel i: [T] (2.3)-(2.5), opposite its azimuth.
 const char* const kTipMbbr =
     "tip the robot by about 40 degrees towards +x, which is a ninth of a turn from wheel 1 on the way to "
@@ -102,7 +100,7 @@ std::unique_ptr<Session> Workbench::open() {
     io = practice_->io();
     ask = practice_->ask();
   } else {
-    if (guard_ == nullptr) guard_ = std::make_unique<GuardProcess>(board_path_, kTick_ms);
+    if (guard_ == nullptr) guard_ = std::make_unique<GuardProcess>(board_path_);
     bbb_error_t error{};
     bbb_config_t wiring = board_.wiring;
     wiring.enable_held_elsewhere = true;

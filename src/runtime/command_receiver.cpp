@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <vector>
 
 namespace equipoise::runtime {
 
@@ -18,16 +17,12 @@ void CommandReceiver::run() {
   constexpr int kTurn_ms = 50;
   constexpr auto kAnnounce = std::chrono::milliseconds(100);
   std::chrono::steady_clock::time_point next{};
-  std::vector<std::uint8_t> bytes;
   while (!stop_.load()) {
     wire_->listen(kTurn_ms, [this](const std::uint8_t* data, std::size_t size) { receive(data, size); });
     const auto now = std::chrono::steady_clock::now();
     if (now < next) continue;
     next = now + kAnnounce;
-    const command_session_t session = gate_.session();
-    bytes.resize(static_cast<std::size_t>(session.getEncodedSize()));
-    session.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    wire_->say(bytes.data(), bytes.size());
+    say(*wire_, gate_.session());
   }
 }
 

@@ -74,11 +74,7 @@ class SerialRemote : public ::testing::Test {
     key_.sign(&m);
     return m;
   }
-  void say(const signed_command_t& m) {
-    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(m.getEncodedSize()));
-    m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    owner_->say(bytes.data(), bytes.size());
-  }
+  void say(const signed_command_t& m) { runtime::say(*owner_, m); }
 
   const CommandKey key_{{1, 2, 3}};
   int master_ = -1;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "equipoise/runtime/frames.hpp"
 
@@ -26,6 +27,14 @@ class CommandWire {
   /// Commands may follow each other at this interval without queueing up on the way.
   virtual double interval_s() const { return 0.05; }
 };
+
+/// An LCM message, encoded.
+template <class Message>
+void say(CommandWire& wire, const Message& message) {
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  wire.say(bytes.data(), bytes.size());
+}
 
 enum class WireSide { kRobot, kOwner };  // the robot hears commands and says its session
 

@@ -15,7 +15,7 @@ class Supervisor {
  public:
   /// `page`: nullptr without a guard. `standing`: reasons known before the start, e.g. kRealtimeMissing.
   Supervisor(const OverrunPolicy& policy, HeartbeatPage* page, std::uint32_t standing)
-      : timing_(policy), page_(page), standing_(standing), guard_(kGuardTicks * policy.period_ns) {
+      : timing_(policy), page_(page), standing_(standing), guard_(kGuardSilent_ns) {
     if (page_ != nullptr) cut_ = page_->cut.load(std::memory_order_acquire);
   }
 
@@ -46,7 +46,6 @@ class Supervisor {
   const LoopTiming& timing() const noexcept { return timing_; }
 
  private:
-  static constexpr int kGuardTicks = 6;  // it polls at twice the tick's rate and yields to this loop
   LoopTiming timing_;
   HeartbeatPage* page_;
   std::uint32_t standing_;

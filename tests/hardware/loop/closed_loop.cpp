@@ -1,9 +1,8 @@
 #include "closed_loop.hpp"
 
-#include <time.h>
-
 #include <cmath>
 #include <cstring>
+#include <equipoise/runtime/monotonic.hpp>
 
 using equipoise::MotorCommand;
 using equipoise::RawSample;
@@ -11,12 +10,6 @@ using equipoise::RawSample;
 namespace {
 constexpr int kMotors = 3;
 constexpr std::int64_t kPeriod_ns = 5'000'000;
-
-std::int64_t monotonicNow() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
-}
 
 equipoise::MbbrWorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
   equipoise::MbbrWorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kFull)];
@@ -78,15 +71,14 @@ void PinWorld::show(const RawSample& raw) {
 }
 
 void PinWorld::tick(bool data_ready) {
-  const std::int64_t now_ns = monotonicNow();
+  const std::int64_t now_ns = equipoise::runtime::monotonic_now_ns();
   if (due_ns_ == 0) due_ns_ = now_ns;
   due_ns_ += kPeriod_ns;
   if (now_ns > due_ns_) {
     ++late_;
     due_ns_ = now_ns;
   }
-  const timespec at{static_cast<time_t>(due_ns_ / 1'000'000'000), static_cast<long>(due_ns_ % 1'000'000'000)};
-  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+  equipoise::runtime::sleep_until(due_ns_);
   world_.advance(pins());
   show(world_.sense());
   if (data_ready) bench_.dataReady();
