@@ -29,7 +29,7 @@ struct FreeEvent {
   void operator()(lcm_eventlog_event_t* event) const { lcm_eventlog_free_event(event); }
 };
 
-void append(const std::string& path, const BenchRow& row, BenchLog* log) {
+void append(const std::string& path, const BenchSample& row, BenchLog* log) {
   if (!log->rows.empty() && !(row.t_s > log->rows.back().t_s)) {
     throw InputError(path + ": time does not advance at sample " + std::to_string(log->rows.size()));
   }
@@ -45,7 +45,7 @@ void write_bench_log(const std::string& path, const BenchLog& log) {
   message.bridge = static_cast<std::int32_t>(log.bridge);
   message.axis = log.axis;
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  for (const BenchRow& row : log.rows) {
+  for (const BenchSample& row : log.rows) {
     message.utime = std::llround(row.t_s * 1e6);
     message.u = row.u;
     message.current_A = row.current_A;
@@ -106,8 +106,9 @@ std::vector<std::string> cells(const std::string& line) {
 }
 
 BenchLog read_csv(const std::string& path) {
-  static constexpr std::array<double BenchRow::*, 5> kFields{
-      &BenchRow::t_s, &BenchRow::u, &BenchRow::current_A, &BenchRow::supply_V, &BenchRow::angle_rad};
+  static constexpr std::array<double BenchSample::*, 5> kFields{
+      &BenchSample::t_s, &BenchSample::u, &BenchSample::current_A, &BenchSample::supply_V,
+      &BenchSample::angle_rad};
   static const std::array<std::string, 5> kNames{"t_s", "u", "current_A", "supply_V", "angle_rad"};
   std::istringstream text(read_text(path));
   std::string line;
@@ -125,7 +126,7 @@ BenchLog read_csv(const std::string& path) {
   for (int number = 2; std::getline(text, line); ++number) {
     const std::vector<std::string> row = cells(line);
     if (row.empty()) continue;
-    BenchRow sample;
+    BenchSample sample;
     for (std::size_t f = 0; f < kNames.size(); ++f) {
       sample.*kFields[f] = std::numeric_limits<double>::quiet_NaN();
       if (column[f] == head.size()) continue;

@@ -6,22 +6,16 @@
 #include <string>
 #include <vector>
 
+#include "equipoise/plant/motor_bench.hpp"
+
 namespace equipoise::app {
 
 enum class LoggedBridge : int { kUnknown = 0, kDriveBrake = 1, kDriveCoast = 2 };
 
-struct BenchRow {
-  double t_s = 0.0;
-  double u = 0.0;
-  double current_A = 0.0;
-  double supply_V = 0.0;
-  double angle_rad = 0.0;
-};
-
 struct BenchLog {
   LoggedBridge bridge = LoggedBridge::kUnknown;
   int axis = 0;  // 0 motor, 1 ball about x, 2 about y
-  std::vector<BenchRow> rows;
+  std::vector<BenchSample> rows;
 };
 
 void write_bench_log(const std::string& path, const BenchLog& log);

@@ -27,9 +27,7 @@ void add_friction_rig(CLI::App& app, int* status) {
   command->callback([=] {
     BenchLog out;
     out.axis = 1;
-    for (const BenchSample& s : run_friction_rig(*p)) {
-      out.rows.push_back({s.t_s, s.u, s.current_A, s.supply_V, s.angle_rad});
-    }
+    out.rows = run_friction_rig(*p);
     write_bench_log(*log, out);
     *status = 0;
   });

@@ -33,7 +33,7 @@ std::string unusable(const BenchLog& log, bool electrical) {
   }
   double largest_u = 0.0;
   for (std::size_t i = 0; i < log.rows.size(); ++i) {
-    const BenchRow& s = log.rows[i];
+    const BenchSample& s = log.rows[i];
     const std::string where = " at sample " + std::to_string(i);
     if (!std::isfinite(s.u)) return "u is not a number" + where;
     if (!std::isfinite(s.angle_rad)) return "angle_rad is not a number" + where;
@@ -81,7 +81,7 @@ double gain_at_small_duty(const BenchLog& log, double R, double k) {
   double predicted_sq = 0.0;
   double product = 0.0;
   for (std::size_t i = 1; i < log.rows.size(); ++i) {
-    const BenchRow& s = log.rows[i];
+    const BenchSample& s = log.rows[i];
     if (std::abs(s.u) > 0.4) continue;
     const double linear = (s.u * s.supply_V - k * rate(log, i)) / R;
     predicted_sq += linear * linear;
@@ -100,8 +100,8 @@ struct Window {
 
 /// Mean rate over the samples from `first` to `last`.
 double slope(const BenchLog& log, std::size_t first, std::size_t last) {
-  const BenchRow& a = log.rows[first];
-  const BenchRow& b = log.rows[last];
+  const BenchSample& a = log.rows[first];
+  const BenchSample& b = log.rows[last];
   return (b.angle_rad - a.angle_rad) / (b.t_s - a.t_s);
 }
 

@@ -29,7 +29,7 @@ nlohmann::json to_json(const BenchFit& f) {
 void write_log(const std::string& path, BridgeType bridge, const std::vector<BenchSample>& samples) {
   BenchLog log;
   log.bridge = bridge == BridgeType::kDriveBrake ? LoggedBridge::kDriveBrake : LoggedBridge::kDriveCoast;
-  for (const BenchSample& s : samples) log.rows.push_back({s.t_s, s.u, s.current_A, s.supply_V, s.angle_rad});
+  log.rows = samples;
   write_bench_log(path, log);
 }
 

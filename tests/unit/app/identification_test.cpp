@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 BenchLog to_log(const std::vector<BenchSample>& samples, LoggedBridge bridge) {
   BenchLog log;
   log.bridge = bridge;
-  for (const BenchSample& s : samples) log.rows.push_back({s.t_s, s.u, s.current_A, s.supply_V, s.angle_rad});
+  log.rows = samples;
   return log;
 }
 
