@@ -7,9 +7,10 @@ set(lcm_stamp ${lcm_out}/generated.stamp)
 add_custom_command(
   OUTPUT ${lcm_stamp}
   COMMAND ${LCM_GEN} --cpp --cpp-hpath ${lcm_out}/cpp ${lcm_files}
+  COMMAND ${CMAKE_COMMAND} -D DIRECTORY=${lcm_out}/cpp/equipoise -P ${CMAKE_CURRENT_LIST_DIR}/RefuseShortStrings.cmake
   COMMAND ${LCM_GEN} --python --ppath ${lcm_out}/python ${lcm_files}
   COMMAND ${CMAKE_COMMAND} -E touch ${lcm_stamp}
-  DEPENDS ${lcm_files}
+  DEPENDS ${lcm_files} ${CMAKE_CURRENT_LIST_DIR}/RefuseShortStrings.cmake
   COMMENT "Generating LCM types")
 add_custom_target(equipoise_lcm_generate DEPENDS ${lcm_stamp})
 add_library(equipoise_lcm_types INTERFACE)
