@@ -4,8 +4,10 @@ find_program(LCM_GEN lcm-gen REQUIRED)
 file(GLOB lcm_files CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/lcm/*.lcm)
 set(lcm_out ${CMAKE_BINARY_DIR}/lcm)
 set(lcm_stamp ${lcm_out}/generated.stamp)
+list(TRANSFORM lcm_files REPLACE "^.*/(.*)\\.lcm$" "${lcm_out}/cpp/equipoise/\\1.hpp" OUTPUT_VARIABLE lcm_headers)
 add_custom_command(
   OUTPUT ${lcm_stamp}
+  BYPRODUCTS ${lcm_headers}
   COMMAND ${LCM_GEN} --cpp --cpp-hpath ${lcm_out}/cpp ${lcm_files}
   COMMAND ${CMAKE_COMMAND} -D DIRECTORY=${lcm_out}/cpp/equipoise -P ${CMAKE_CURRENT_LIST_DIR}/RefuseShortStrings.cmake
   COMMAND ${LCM_GEN} --python --ppath ${lcm_out}/python ${lcm_files}
