@@ -9,7 +9,7 @@
 
 #include "monotonic.h"
 
-enum { EXPORT_WAIT_MS = 1000, EXPORT_POLL_MS = 10 };
+enum { EXPORT_WAIT_MS = 5000, EXPORT_POLL_MS = 10 };
 
 /* "pwm1", or on BeagleBoard.org kernels "pwm-4:1" with the chip's number. */
 static int channel_dir(char out[SYSFS_PATH_MAX], const char* chip_dir, unsigned channel) {
@@ -27,20 +27,23 @@ static int channel_dir(char out[SYSFS_PATH_MAX], const char* chip_dir, unsigned 
   return access(out, F_OK) == 0 ? 0 : -ENOENT;
 }
 
-/* After the export udev hands the attributes to our group, a moment later. */
+static int writable(const char* dir) {
+  static const char* const attributes[] = {"period", "duty_cycle", "enable"};
+  for (size_t i = 0; i < sizeof attributes / sizeof *attributes; ++i) {
+    const int fd = sysfs_open(dir, attributes[i], O_WRONLY);
+    if (fd < 0) return fd;
+    close(fd);
+  }
+  return 0;
+}
+
+/* After the export udev hands the attributes to our group, a moment later, and one after the other. */
 static int wait_writable(pwm_t* pwm) {
   int status = -ENOENT;
   for (int waited = 0; waited <= EXPORT_WAIT_MS; waited += EXPORT_POLL_MS) {
     status = channel_dir(pwm->dir, pwm->chip_dir, pwm->channel);
-    if (status == 0) {
-      const int fd = sysfs_open(pwm->dir, "enable", O_WRONLY);
-      if (fd >= 0) {
-        close(fd);
-        return 0;
-      }
-      status = fd;
-    }
-    if (status != -ENOENT && status != -EACCES) break;
+    if (status == 0) status = writable(pwm->dir);
+    if (status != -EACCES) break;
     sleep_ms(EXPORT_POLL_MS);
   }
   return status;

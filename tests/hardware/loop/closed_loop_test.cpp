@@ -9,15 +9,18 @@
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <equipoise/health_t.hpp>
 #include <filesystem>
 #include <optional>
+#include <set>
 
 #include "app/log_reader.hpp"
 #include "equipoise/actuate/safety.hpp"
+#include "syscall_trace.hpp"
 
 using namespace equipoise;
 
@@ -130,6 +133,30 @@ TEST_F(ClosedLoop, StaysUprightForTwentySecondsAndCoastsOnSigterm) {
   kill(child_, SIGTERM);
   EXPECT_LE(ticksUntilOff(), 3);
   EXPECT_EQ(terminated(), 0);
+}
+
+// The drivers' own calls, each of which reads or writes one device; nothing that waits, locks, allocates or
+// logs.
+TEST_F(ClosedLoop, InATickOnlyTheDriversCallTheKernelAndNothingSleeps) {
+  SyscallTrace trace(child_);
+  balance(kTicksPerSecond);
+  trace.begin();
+  balance(2 * kTicksPerSecond);
+  trace.end();
+  const std::vector<TracedTick> ticks = trace.ticks({SYS_ppoll, SYS_ppoll_time64});
+  ASSERT_GT(ticks.size(), 350U);
+  const std::set<int> of_drivers = {SYS_ioctl, SYS_read, SYS_write, SYS_pread64, SYS_pwrite64};
+  int most = 0;
+  int sleeps = 0;
+  for (const TracedTick& tick : ticks) {
+    for (const auto& [call, times] : tick.calls) EXPECT_EQ(of_drivers.count(call), 1U) << "call " << call;
+    most = std::max(most, tick.sum());
+    sleeps += tick.sleeps;
+  }
+  EXPECT_EQ(sleeps, 0);
+  EXPECT_GT(most, 5) << "it reads and writes";
+  EXPECT_LE(most, 40);
+  printf("trace: %zu ticks, at most %d system calls in one, %d sleeps\n", ticks.size(), most, sleeps);
 }
 
 TEST_F(ClosedLoop, CoastsWithinThreeTicksOfBeingKilled) {
