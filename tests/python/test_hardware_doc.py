@@ -9,7 +9,20 @@ from functools import cache
 import pytest
 
 # Commands of a Debian system that the page may use; what they do is Debian's.
-SYSTEM = {"apt-cache", "adduser", "reboot", "timedatectl", "systemctl", "journalctl", "ip", "tee", "echo"}
+SYSTEM = {
+    "apt-cache",
+    "adduser",
+    "reboot",
+    "timedatectl",
+    "systemctl",
+    "journalctl",
+    "ip",
+    "tee",
+    "echo",
+    "lsblk",
+    "dd",
+    "ssh",
+}
 
 
 def commands(root) -> list[tuple[str, list[str]]]:

@@ -76,6 +76,9 @@ def test_the_service_is_understood_and_gives_what_the_doctor_asks_for(root, tmp_
     command = ["systemd-analyze", "verify", "--man=no", tmp_path / "equipoise.service"]
     ended = subprocess.run(command, capture_output=True, text=True)
     assert "equipoise.service" not in ended.stderr, ended.stderr
+    sandbox = ["systemd-analyze", "security", "--offline=yes", "--no-pager", "--threshold=40"]
+    ended = subprocess.run([*sandbox, tmp_path / "equipoise.service"], capture_output=True, text=True)
+    assert ended.returncode == 0, "exposure 4.0 or more:" + ended.stdout[-4000:]
 
 
 def test_run_tells_the_service_manager_that_it_is_ready_and_alive(root, tmp_path):

@@ -106,7 +106,8 @@ def test_another_system_is_told_what_to_install(machine):
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "test", "cross-test", "vm-test", "sysroot", "package", "lint", "lib/multicast"]
+    "command",
+    ["run", "test", "cross-test", "vm-test", "fuzz", "sysroot", "package", "image", "lint", "lib/multicast"],
 )
 def test_every_command_has_help(root, command):
     result = subprocess.run([root / "tools" / command, "--help"], capture_output=True, text=True)

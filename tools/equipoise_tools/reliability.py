@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import re
@@ -11,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from .paths import repository_root
@@ -89,6 +90,41 @@ def tick(_: argparse.Namespace) -> Part:
         [
             ("allocations in a tick", "0", f"0 in {passed} test flights", passed > 0),
             ("system calls in the pipeline's tick", "0 (seccomp)", f"0 in {passed} test flights", passed > 0),
+        ]
+    )
+
+
+def trace(_: argparse.Namespace) -> Part:
+    output(ROOT / "tools/vm-test", "robot", check=False)
+    console = (ROOT / "build/vm/console-bookworm.log").read_text(errors="replace")
+    found = re.search(r"^trace: (\d+) ticks, at most (\d+) system calls in one, (\d+) sleeps", console, re.M)
+    ticks, most, sleeps = map(int, found.groups()) if found else (0, 0, 0)
+    passed = "[       OK ] ClosedLoop.InATickOnlyTheDrivers" in console
+    return Part(
+        [
+            (
+                "system calls of a whole tick, kernel's trace",
+                "the drivers' only, 0 that block",
+                f"{ticks} ticks of the emulated robot: at most {most}, drivers' only; {sleeps} blocked",
+                passed and ticks > 0 and sleeps == 0,
+            )
+        ]
+    )
+
+
+def sandbox(_: argparse.Namespace) -> Part:
+    text = output(
+        "systemd-analyze", "security", "--offline=yes", "--no-pager", ROOT / "packaging/equipoise.service"
+    )
+    exposure = float(re.findall(r"exposure level for \S+: (\S+)", text)[-1])
+    return Part(
+        [
+            (
+                "service's sandbox",
+                "exposure below 4.0",
+                f"{exposure} (systemd-analyze security)",
+                exposure < 4.0,
+            )
         ]
     )
 
@@ -209,12 +245,37 @@ PARTS: dict[str, Callable[[argparse.Namespace], Part]] = {
     "faults": faults,
     "guard": guard,
     "tick": tick,
+    "trace": trace,
     "wake": wake,
     "commands": commands,
+    "sandbox": sandbox,
     "blackbox": blackbox,
     "fuzz": fuzz,
     "sanitizers": sanitizers,
 }
+
+
+def source() -> str:
+    """What the measured code was; empty when that cannot be said."""
+    state = output("git", "status", "--porcelain", "--", ".", ":!docs", check=False)
+    trees = output("git", "ls-tree", "-r", "HEAD", "--", ".", check=False)
+    code = "".join(line for line in trees.splitlines(True) if "\tdocs/" not in line)
+    return "" if state or not code else hashlib.sha256(code.encode()).hexdigest()
+
+
+def measure(name: str, options: argparse.Namespace) -> Part:
+    """Kept in build/reliability, so that hours of measuring survive an interruption."""
+    kept = ROOT / "build" / "reliability" / f"{name}.json"
+    key = [source(), options.soak_hours, options.fuzz_runs]
+    if options.resume and key[0] and kept.is_file():
+        told = json.loads(kept.read_text())
+        if told["key"] == key:
+            return Part([tuple(row) for row in told["rows"]], told["section"])
+    part = PARTS[name](options)
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    kept.write_text(json.dumps({"key": key, **asdict(part)}))
+    return part
+
 
 HEAD = """# Reliability
 Written by `tools/reliability`{arguments}, {cpus} CPUs, kernel {kernel}. Faults enter at the hardware
@@ -242,6 +303,9 @@ def main() -> int:
     parser.add_argument(
         "--skip", action="append", default=[], choices=PARTS, help="leave this part out; the page says so"
     )
+    parser.add_argument(
+        "--resume", action="store_true", help="keep what was measured before of the very same code"
+    )
     options = parser.parse_args()
     unknown = [name for name in options.parts if name not in PARTS]
     if unknown:
@@ -249,7 +313,7 @@ def main() -> int:
     rows, sections = [], []
     for name in options.parts or [name for name in PARTS if name not in options.skip]:
         print(f"{name} ...", file=sys.stderr, flush=True)
-        part = PARTS[name](options)
+        part = measure(name, options)
         rows += part.rows
         sections.append(part.section)
         for row in part.rows:
@@ -257,7 +321,7 @@ def main() -> int:
     table = "".join(
         f"| {what} | {wanted} | {got} | {'yes' if ok else '**no**'} |\n" for what, wanted, got, ok in rows
     )
-    arguments = "".join(f" {argument}" for argument in sys.argv[1:])
+    arguments = "".join(f" {argument}" for argument in sys.argv[1:] if argument != "--resume")
     head = HEAD.format(arguments=arguments, cpus=os.cpu_count(), kernel=os.uname().release)
     left_out = f"\nNot measured this time: {', '.join(options.skip)}.\n" if options.skip else ""
     page = head + table + left_out + "\n" + "\n".join(section for section in sections if section)

@@ -13,8 +13,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <equipoise/health_t.hpp>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <set>
 
@@ -40,6 +42,16 @@ void becomeTheWorld() {
   ASSERT_EQ(sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &priority), 0);
   ASSERT_EQ(mlockall(MCL_CURRENT | MCL_FUTURE), 0);
   ASSERT_EQ(prctl(PR_SET_CHILD_SUBREAPER, 1), 0);  // the guard of a killed firmware becomes our child
+}
+
+// Until the kernel kills it.
+[[noreturn]] void takeAllMemory() {
+  std::ofstream("/proc/self/oom_score_adj") << 1000;
+  constexpr std::size_t kPiece = std::size_t{1} << 20U;
+  for (;;) {
+    void* piece = mmap(nullptr, kPiece, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (piece != MAP_FAILED) std::memset(piece, 1, kPiece);
+  }
 }
 
 class ClosedLoop : public ::testing::Test {
@@ -157,6 +169,21 @@ TEST_F(ClosedLoop, InATickOnlyTheDriversCallTheKernelAndNothingSleeps) {
   EXPECT_GT(most, 5) << "it reads and writes";
   EXPECT_LE(most, 40);
   printf("trace: %zu ticks, at most %d system calls in one, %d sleeps\n", ticks.size(), most, sleeps);
+}
+
+// Its memory is locked: what another process takes away is not its own.
+TEST_F(ClosedLoop, FliesOnWhileAnotherProcessTakesAllMemory) {
+  balance(kTicksPerSecond);
+  const pid_t hog = fork();
+  if (hog == 0) takeAllMemory();
+  int status = 0;
+  for (int i = 0; i < 60 * kTicksPerSecond && waitpid(hog, &status, WNOHANG) == 0; ++i) {
+    balance(1);
+    if (HasFatalFailure()) break;
+  }
+  kill(hog, SIGKILL);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) << "memory did not run out";
+  balance(kTicksPerSecond);
 }
 
 TEST_F(ClosedLoop, CoastsWithinThreeTicksOfBeingKilled) {
