@@ -233,7 +233,7 @@ def sanitizers(_: argparse.Namespace) -> Part:
         output("cmake", "--preset", preset)
         output("cmake", "--build", f"build/{preset}", "--target", *targets)
         filter_ = "--label-regex", "unit|drivers|runtime"
-        text = output(*isolated("ctest", "--preset", preset, *filter_), check=False)
+        text = output(*isolated("ctest", "--preset", preset, "-j", os.cpu_count(), *filter_), check=False)
         found = re.search(r"(\d+)% tests passed, (\d+) tests failed out of (\d+)", text)
         failed, total = (int(found[2]), int(found[3])) if found else (1, 0)
         measured = f"{total} tests, {failed} failed"
