@@ -58,8 +58,8 @@ void add_options(CLI::App* command, WorkbenchArguments* a) {
   command->add_option("--practice-fault", a->faults, "of the practice robot, e.g. motor-1-reversed");
 }
 
-Workbench::Workbench(const WorkbenchArguments& a) : robot_(robot_type(a.config)), board_path_(a.board) {
-  board_ = load_wiring(a.board);
+Workbench::Workbench(const WorkbenchArguments& a)
+    : robot_(robot_type(a.config)), board_path_(a.board), board_(load_wiring(a.board)) {
   if (board_.robot.compare(robot_) != 0) {
     throw InputError(a.board + ": board.robot: \"" + board_.robot + "\" where " + a.config + " says \"" +
                      robot_ + "\"");

@@ -29,7 +29,7 @@ def cppcheck(tree: Tree) -> list[Finding]:
     names = [name for name in tree.ending(".c", ".cpp") if name.startswith(("drivers/", "src/"))]
     if shutil.which("cppcheck") is None:
         return missing("cppcheck")
-    command = ["cppcheck", "--quiet", "-j2", "--enable=warning,portability", "--inline-suppr"]
+    command = ["cppcheck", "--quiet", "-j2", "--enable=warning,portability,performance", "--inline-suppr"]
     # Its parser gives up on some of C++17, which is no finding about the source.
     command += ["--suppress=internalAstError", "--template={file}:{line}: {message} [{id}]"]
     command += ["-Idrivers", "-Iinclude", "-Isrc", "-Iconfig", *names]
