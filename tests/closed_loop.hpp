@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "app/mbbr_rig.hpp"
+#include "app/evaluate/mbbr_rig.hpp"
 
 namespace equipoise {
 

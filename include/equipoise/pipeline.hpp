@@ -9,7 +9,7 @@
 #include "equipoise/actuate/encoder_check.hpp"
 #include "equipoise/actuate/safety.hpp"
 #include "equipoise/control/friction.hpp"
-#include "equipoise/robots/contract.hpp"
+#include "equipoise/robot_contract.hpp"
 #include "equipoise/sense/attitude_filter.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "equipoise/sense/freshness.hpp"

@@ -1,4 +1,4 @@
-#include "common_config.hpp"
+#include "config/common_config.hpp"
 
 #include <algorithm>
 

@@ -4,8 +4,14 @@
 
 #include <functional>
 
+#include "config/toml_reader.hpp"
+#include "equipoise/actuate/bridge.hpp"
+#include "equipoise/actuate/safety.hpp"
 #include "equipoise/estimate/kalman.hpp"
-#include "toml_reader.hpp"
+#include "equipoise/plant/world.hpp"
+#include "equipoise/sense/attitude_filter.hpp"
+#include "equipoise/sense/calibrate.hpp"
+
 
 namespace equipoise::config {
 

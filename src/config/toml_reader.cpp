@@ -1,4 +1,4 @@
-#include "toml_reader.hpp"
+#include "config/toml_reader.hpp"
 
 #include <sodium.h>
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
+#include "equipoise/types.hpp"
 
 namespace equipoise::config {
 

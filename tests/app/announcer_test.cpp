@@ -1,4 +1,4 @@
-#include "app/announcer.hpp"
+#include "app/run/announcer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,13 +2,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "app/board_edit.hpp"
-#include "app/calibration_file.hpp"
-#include "app/commands.hpp"
-#include "app/interrupt.hpp"
-#include "app/mock.hpp"
-#include "app/practice.hpp"
+#include "app/board/board_edit.hpp"
+#include "app/board/calibration_file.hpp"
+#include "app/cli/commands.hpp"
+#include "app/cli/interrupt.hpp"
+#include "app/io/mock.hpp"
+#include "app/commission/practice.hpp"
 #include "equipoise/config.hpp"
+#include "robots/mip/config.hpp"
+#include "robots/mbbr/config.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -1,5 +1,5 @@
 // Gyro bias, six-face fit and mount rotation on made-up samples with known answers.
-#include "app/calibrate_imu.hpp"
+#include "app/commission/calibrate_imu.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

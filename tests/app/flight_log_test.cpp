@@ -1,4 +1,4 @@
-#include "app/flight_log.hpp"
+#include "app/log/flight_log.hpp"
 
 #include <gtest/gtest.h>
 

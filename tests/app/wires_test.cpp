@@ -1,5 +1,5 @@
 // Commands over a serial line: a pseudo-terminal in the place of the HC-06.
-#include "app/wires.hpp"
+#include "app/run/wires.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -11,7 +11,7 @@
 #include <optional>
 #include <thread>
 
-#include "app/commands.hpp"
+#include "app/cli/commands.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 
 namespace equipoise::app {

@@ -1,5 +1,5 @@
 // The doctor's look at a robot's devices, on umockdev's bus: which chip answers, and how it fails.
-#include "app/doctor.hpp"
+#include "app/doctor/doctor.hpp"
 
 #include <cerrno>
 

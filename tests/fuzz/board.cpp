@@ -1,5 +1,5 @@
 // Any text is a board the drivers can be given, or a ConfigError.
-#include "app/board.hpp"
+#include "app/board/board.hpp"
 
 #include <cstddef>
 #include <cstdint>

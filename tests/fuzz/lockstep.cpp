@@ -1,5 +1,5 @@
 // Any packet is refused or becomes counts.
-#include "app/lockstep.hpp"
+#include "app/io/lockstep.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "app/commands.hpp"
-#include "app/flight_log.hpp"
+#include "app/cli/commands.hpp"
+#include "app/log/flight_log.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {

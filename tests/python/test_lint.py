@@ -111,7 +111,7 @@ def test_law_keeps_the_operating_system_out_of_core(tmp_path, name, header):
     [
         "equipoise/types.hpp",
         "equipoise/samples.hpp",
-        "equipoise/robots/mbbr.hpp",
+        "robots/mbbr/mbbr.hpp",
         "generated/mbbr_gains.hpp",
         "equipoise/estimate/joseph.hpp",
     ],

@@ -1,6 +1,6 @@
 // The guard as a process of its own, a stand-in for the loop as another, files in the place of sysfs. Times
 // are in the robot's ticks; the machine may be busy, so the best of a few attempts counts, and it is printed.
-#include "app/guard.hpp"
+#include "app/guard/guard.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>

@@ -1,7 +1,7 @@
 // The MBBR through the real pipeline, hardware boundary and exact world. Given / when / then.
 #include <gtest/gtest.h>
 
-#include "app/simulate.hpp"
+#include "app/sim/simulate.hpp"
 
 namespace equipoise {
 namespace {

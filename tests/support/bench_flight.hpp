@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "app/firmware.hpp"
-#include "app/plant_backend.hpp"
+#include "app/run/firmware.hpp"
+#include "app/io/plant_backend.hpp"
 
 namespace equipoise {
 

@@ -1,5 +1,5 @@
 // The board files: what the drivers get, and what is refused.
-#include "app/board.hpp"
+#include "app/board/board.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,8 @@
 #include <sstream>
 
 #include "equipoise/config.hpp"
+#include "robots/mip/config.hpp"
+#include "robots/mbbr/config.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -69,7 +71,7 @@ TEST(Board, ItsMountAndBatteryScaleReplaceTheConfigurations) {
   const std::string mount = "[1, 0, 0, 0, 1, 0, 0, 0, 1]";
   turned.replace(turned.find(mount), mount.size(), "[0, -1, 0, 1, 0, 0, 0, 0, 1]");
   const Board board = parse_board(turned, "b.toml");
-  const LoadedMbbr loaded =
+  const Loaded<MbbrConfig> loaded =
       load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", board.calibration);
   Mat3 expected;
   expected << 0, -1, 0, 1, 0, 0, 0, 0, 1;

@@ -6,7 +6,7 @@
 #include <equipoise/config.hpp>
 #include <equipoise/plant/mbbr_world.hpp>
 
-#include "app/board.hpp"
+#include "app/board/board.hpp"
 #include "bench.hpp"
 
 class PinWorld {

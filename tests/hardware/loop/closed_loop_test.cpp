@@ -20,7 +20,7 @@
 #include <optional>
 #include <set>
 
-#include "app/log_reader.hpp"
+#include "app/log/log_reader.hpp"
 #include "equipoise/actuate/safety.hpp"
 #include "syscall_trace.hpp"
 

@@ -1,4 +1,4 @@
-#include "app/identification.hpp"
+#include "app/identify/identification.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,5 @@
 #include "equipoise/config.hpp"
+#include "robots/mbbr/config.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -52,7 +53,7 @@ class EditedConfig {
 };
 
 TEST(Config, TheShippedFileLoads) {
-  const LoadedMbbr loaded = load_mbbr(kMbbr, {});
+  const Loaded<MbbrConfig> loaded = load_mbbr(kMbbr, {});
   EXPECT_EQ(loaded.config.robot.m_t, 0.550);
   EXPECT_EQ(loaded.sha256.size(), 64U);
   EXPECT_EQ(loaded.sha256, load_mbbr(kMbbr, {}).sha256);
@@ -94,7 +95,7 @@ TEST(Config, FragmentsReplaceValuesAndOverridesHaveTheLastWord) {
   const std::string fragment = testing::TempDir() + "fragment_" + std::to_string(::getpid()) + ".toml";
   std::ofstream(fragment) << "[motor]\nresistance_ohm = 4.5\ninductance_H = 1e-3\n";
   const std::string include = "include=[\"" + fragment + "\"]";
-  const LoadedMbbr loaded = load_mbbr(kMbbr, {"motor.inductance_H=2e-3", include});
+  const Loaded<MbbrConfig> loaded = load_mbbr(kMbbr, {"motor.inductance_H=2e-3", include});
   EXPECT_EQ(loaded.config.motor.resistance_ohm, 4.5);
   EXPECT_EQ(loaded.config.motor.inductance_H, 2e-3);
   std::ofstream(fragment) << "[motor]\nresistence_ohm = 4.5\n";

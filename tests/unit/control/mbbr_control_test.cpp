@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "equipoise/control/friction.hpp"
-#include "equipoise/control/mbbr_scheduled_feedback.hpp"
-#include "equipoise/control/mbbr_thesis_feedback.hpp"
+#include "robots/mbbr/scheduled_feedback.hpp"
+#include "robots/mbbr/thesis_feedback.hpp"
 
 namespace equipoise {
 namespace {

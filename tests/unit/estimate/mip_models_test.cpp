@@ -1,9 +1,9 @@
 // Coefficients from physics.md section 2 (derived) and [T] (3.38)-(3.47) (printed); Jacobians by differences.
-#include "equipoise/estimate/mip_models.hpp"
+#include "robots/mip/models.hpp"
 
 #include <gtest/gtest.h>
 
-#include "equipoise/estimate/mip_published.hpp"
+#include "robots/mip/published.hpp"
 
 namespace equipoise {
 namespace {

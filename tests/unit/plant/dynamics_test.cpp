@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "equipoise/plant/mbbr_dynamics.hpp"
-#include "equipoise/plant/mip_dynamics.hpp"
+#include "robots/mbbr/dynamics.hpp"
+#include "robots/mip/dynamics.hpp"
 #include "support/oracle.hpp"
 
 namespace equipoise {

@@ -1,7 +1,7 @@
 // Each effect of the full world alone: with it the robot moves or measures differently, in the way it should.
 #include <gtest/gtest.h>
 
-#include "equipoise/plant/mbbr_world.hpp"
+#include "robots/mbbr/world.hpp"
 #include "equipoise/plant/switched_motor.hpp"
 
 namespace equipoise {

@@ -1,8 +1,8 @@
-#include "equipoise/robots/omniwheels.hpp"
+#include "robots/mbbr/omniwheels.hpp"
 
 #include <gtest/gtest.h>
 
-#include "equipoise/robots/mbbr.hpp"
+#include "robots/mbbr/mbbr.hpp"
 
 namespace equipoise {
 namespace {

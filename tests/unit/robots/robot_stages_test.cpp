@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "equipoise/control/friction.hpp"
-#include "equipoise/robots/mbbr.hpp"
-#include "equipoise/robots/mip.hpp"
+#include "robots/mbbr/mbbr.hpp"
+#include "robots/mip/mip.hpp"
 
 namespace equipoise {
 namespace {

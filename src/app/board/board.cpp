@@ -1,0 +1,174 @@
+#include "app/board/board.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+
+#include "app/board/calibration_file.hpp"
+#include "config/toml_reader.hpp"
+
+namespace equipoise::app {
+namespace {
+
+using config::Document;
+using config::Section;
+
+constexpr int kMaxLine = 31;  // a GPIO bank of the AM335x has 32 lines
+
+template <std::size_t N>
+void copy_text(Section& s, const std::string& key, char (&to)[N]) {
+  const std::string value = s.text(key);
+  if (value.size() >= N) s.fail(key, "is too long; allowed: " + std::to_string(N - 1) + " characters");
+  if (value.find('\0') != std::string::npos) s.fail(key, "holds a zero character");
+  std::memcpy(to, value.c_str(), value.size() + 1);
+}
+
+BoardLine read_line(Section& s, const std::string& key) {
+  const auto [chip, line] = s.text_and_integer(key, 0, kMaxLine);
+  if (chip.empty() || chip.size() >= BBB_NAME_MAX || chip.find('\0') != std::string::npos) {
+    s.fail(key, "names no gpio chip; expected its address or label, e.g. \"44e07000\"");
+  }
+  return {chip, line};
+}
+
+bbb_pin_t read_pin(Section& s, const std::string& key, bool active_low = false) {
+  const BoardLine line = read_line(s, key);
+  bbb_pin_t pin{};
+  pin.used = true;
+  pin.line = static_cast<std::uint32_t>(line.line);
+  pin.active_low = active_low;
+  std::memcpy(pin.chip, line.chip.c_str(), line.chip.size() + 1);
+  return pin;
+}
+
+int read_one_of(Section& s, const std::string& key, const std::vector<int>& values) {
+  const int value = s.integer(key, values.front(), values.back());
+  std::string allowed;
+  for (const int each : values) {
+    if (each == value) return value;
+    allowed += (allowed.empty() ? "" : ", ") + std::to_string(each);
+  }
+  s.fail(key, std::to_string(value) + " is not possible; allowed: " + allowed);
+}
+
+bbb_imu_t read_imu(Section s) {
+  bbb_imu_t imu{};
+  copy_text(s, "bus", imu.bus);
+  imu.address = static_cast<std::uint16_t>(s.integer("address", 0x08, 0x77));
+  imu.rate_hz = static_cast<std::uint16_t>(s.integer("rate_hz", 200, 200));
+  imu.gyro_range_dps = static_cast<std::uint16_t>(read_one_of(s, "gyro_range_deg_s", {250, 500, 1000, 2000}));
+  imu.accel_range_g = static_cast<std::uint16_t>(read_one_of(s, "accel_range_g", {2, 4, 8, 16}));
+  imu.dlpf = static_cast<std::uint8_t>(s.integer("low_pass", 1, 6));
+  imu.stuck_after = static_cast<std::uint16_t>(s.integer("stuck_after_samples", 0, 1000));
+  imu.interrupt = read_pin(s, "interrupt", s.boolean("interrupt_active_low"));
+  imu.late_after_us = static_cast<std::uint32_t>(s.integer("late_after_us", 1, 5000));
+  copy_text(s, "dmp_firmware", imu.dmp_firmware);
+  s.numbers("R_BS", 9, -1.0, 1.0);
+  s.finish();
+  return imu;
+}
+
+bbb_motor_t read_motor(Section& s) {
+  bbb_motor_t motor{};
+  motor.bridge = s.choice("bridge", {"mc33926", "tb6612"}) == 0 ? BBB_MC33926 : BBB_TB6612;
+  motor.in1 = read_pin(s, "in1");
+  motor.in2 = read_pin(s, "in2");
+  if (s.has("fault")) motor.fault = read_pin(s, "fault", true);  // SF pulls low
+  copy_text(s, "pwm", motor.pwm);
+  motor.pwm_channel = static_cast<std::uint32_t>(s.choice("pwm_channel", {"A", "B"}));
+  motor.motor_reversed = s.boolean("motor_reversed");
+  copy_text(s, "encoder", motor.encoder);
+  motor.encoder_reversed = s.boolean("encoder_reversed");
+  s.finish();
+  return motor;
+}
+
+/// Battery scale, and the channel's own entries.
+void read_battery(Section s, Board* board) {
+  copy_text(s, "adc", board->wiring.adc);
+  board->wiring.battery_channel = static_cast<std::uint32_t>(s.integer("channel", 0, 7));
+  board->battery_V_per_count = s.number("V_per_count", 1e-6, 1.0);
+  board->battery_offset_V = s.number("offset_V", -5.0, 5.0);
+  board->wiring.battery_every_ticks = static_cast<std::uint32_t>(s.integer("every_ticks", 1, 200));
+  s.finish();
+  board->calibration.push_back("calibration.battery_V_per_count=" + toml_number(board->battery_V_per_count));
+  board->calibration.push_back("calibration.battery_offset_V=" + toml_number(board->battery_offset_V));
+}
+
+void read_panel(Section& root, Board* board) {
+  Section jack = root.table("dc_jack");
+  board->dc_jack_channel = jack.integer("channel", 0, 7);
+  jack.number("V_per_count", 1e-6, 1.0);
+  jack.number("offset_V", -5.0, 5.0);
+  jack.finish();
+
+  Section leds = root.table("leds");
+  board->led_red = read_line(leds, "red");
+  board->led_green = read_line(leds, "green");
+  for (const auto& [chip, line] : leds.texts_and_integers("bars", 8, 0, kMaxLine))
+    board->led_bars.push_back({chip, line});
+  leds.finish();
+
+  Section buttons = root.table("buttons");
+  board->button_pause = read_line(buttons, "pause");
+  board->button_mode = read_line(buttons, "mode");
+  board->buttons_active_low = buttons.boolean("active_low");
+  buttons.finish();
+
+  Section serial = root.table("serial");
+  board->serial_device = serial.text("device");
+  board->serial_baud = read_one_of(serial, "baud", {9600, 19200, 38400, 57600, 115200});
+  serial.finish();
+
+  Section can = root.table("can");
+  board->can_interface = can.text("interface");
+  board->can_bitrate = can.integer("bitrate", 10000, 1000000);
+  can.finish();
+}
+
+Board read_board(const Document& document) {
+  Section root(document, document.root(), "");
+  Board board;
+  Section about = root.table("board");
+  board.robot = about.text("robot");
+  if (about.has("calibration")) board.calibration_file = about.text("calibration");
+  about.finish();
+
+  Section imu = root.table("imu");
+  const std::vector<double> mount = imu.numbers("R_BS", 9, -1.0, 1.0);
+  std::copy(mount.begin(), mount.end(), board.R_BS.begin());
+  board.calibration.push_back("calibration.R_BS=" + toml_array(mount));
+  board.wiring.imu = read_imu(imu);
+
+  Section bridges = root.table("bridges");
+  board.wiring.pwm_hz = static_cast<std::uint32_t>(bridges.integer("pwm_hz", 100, 100000));
+  const bool active_low = bridges.boolean("enable_active_low");
+  board.wiring.enable = read_pin(bridges, "enable", active_low);
+  bridges.finish();
+
+  for (Section& motor : root.tables("motor", 1, RIO_MAX_MOTORS))
+    board.wiring.motor[board.wiring.motors++] = read_motor(motor);
+  read_battery(root.table("battery"), &board);
+  read_panel(root, &board);
+  root.finish();
+  return board;
+}
+
+}  // namespace
+
+Board load_wiring(const std::string& path) { return read_board(Document(path, {})); }
+
+Board load_board(const std::string& path) {
+  Board board = load_wiring(path);
+  if (board.calibration_file.empty()) return board;
+  const auto file = std::filesystem::path(path).parent_path() / board.calibration_file;
+  const CalibrationFile calibration = load_calibration(file.string(), board.robot);
+  for (const std::string& line : overrides_of(calibration, board.R_BS)) board.calibration.push_back(line);
+  return board;
+}
+
+Board parse_board(const std::string& text, const std::string& origin) {
+  return read_board(Document::parse(text, origin));
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,75 @@
+// Subcommand-line options without the parser's header: a subcommand declares typed options and one action.
+// In: argv -> out: exit code: 0 success, 1 a job that failed, 2 bad usage (said on stderr). Numbers are checked:
+// NaN, infinity, a sign where none belongs and values that do not fit are refused. Start-up only.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace equipoise::app {
+
+/// A handle: copies name the same option.
+class Option {
+ public:
+  Option required() const;
+  Option show_default() const;
+  Option range(double low, double high) const;
+  Option one_of(const std::vector<std::string>& names) const;
+  Option excludes(const Option& other) const;
+  Option needs(const Option& other) const;
+  Option count(int values) const;  // exactly so many values
+  bool given() const;              // in the action: the user named it
+
+ private:
+  friend class Subcommand;
+  explicit Option(void* impl) : impl_(impl) {}
+  void* impl_;
+};
+
+/// A handle: copies name the same command. `name` of an option as "--long", "-s,--long" or, positional, "file".
+class Subcommand {
+ public:
+  Subcommand subcommand(const std::string& name, const std::string& help) const;
+  void require_subcommand() const;
+
+  Option option(const std::string& name, std::string& value, const std::string& help = "") const;
+  Option option(const std::string& name, double& value, const std::string& help = "") const;
+  Option option(const std::string& name, int& value, const std::string& help = "") const;
+  Option option(const std::string& name, std::int64_t& value, const std::string& help = "") const;
+  Option option(const std::string& name, std::uint64_t& value, const std::string& help = "") const;
+  Option option(const std::string& name, std::vector<std::string>& value, const std::string& help = "") const;
+  Option option(const std::string& name, std::vector<double>& value, const std::string& help = "") const;
+  Option option(const std::string& name, std::vector<int>& value, const std::string& help = "") const;
+  /// "--yes" or "--yes,!--no".
+  Option flag(const std::string& name, bool& value, const std::string& help = "") const;
+
+  /// Runs when the command was named; returns the exit code.
+  void action(std::function<int()> run) const;
+
+ private:
+  friend class CommandLine;
+  Subcommand(void* impl, int* status) : impl_(impl), status_(status) {}
+  void* impl_;
+  int* status_;
+};
+
+class CommandLine {
+ public:
+  CommandLine(const std::string& help, const std::string& version);
+  ~CommandLine();
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
+
+  Subcommand root();
+  /// Exit code. What an action throws is the caller's.
+  int run(int argc, char** argv);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace equipoise::app

@@ -1,0 +1,224 @@
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "app/commission/calibrate_imu.hpp"
+#include "app/commission/calibrate_wheels.hpp"
+#include "app/board/calibration_file.hpp"
+#include "app/cli/commands.hpp"
+#include "app/commission/workbench.hpp"
+
+namespace equipoise::app {
+namespace {
+
+constexpr double kGyro_s = 3.0;
+constexpr double kPose_s = 1.0;
+constexpr int kMaxPoses = 12;  // six faces and as many mistakes
+constexpr int kTurns = 5;
+constexpr double kMaxCountsError = 0.02;
+
+struct Arguments {
+  WorkbenchArguments bench;
+  std::string what;
+  std::string out = "calibration.toml";
+  std::string json;
+};
+
+struct Result {
+  std::string text;
+  std::string complaint;  // empty: all is as the files say
+};
+
+nlohmann::json json_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+template <class... Args>
+std::string format(const char* text, Args... args) {
+  char out[240];
+  std::snprintf(out, sizeof out, text, args...);
+  return out;
+}
+
+Result calibrate_gyro(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
+  const auto session = bench.open();
+  const Stillness still = session->hold_still(kGyro_s);
+  const GyroBias found = gyro_bias(still, bench.calibration());
+  file->gyro = {stamp_of(still.temperature_degC), found.bias_S_rad_s, found.sigma_S_rad_s};
+  const Vec3 deg = found.bias_S_rad_s * 180.0 / kPi;
+  *json = {{"bias_rad_s", json_of(found.bias_S_rad_s)}, {"sigma_rad_s", json_of(found.sigma_S_rad_s)}};
+  return {format("gyro bias %.3f %.3f %.3f deg/s, noise %.3f deg/s", deg.x(), deg.y(), deg.z(),
+                 found.sigma_S_rad_s.maxCoeff() * 180.0 / kPi),
+          ""};
+}
+
+/// Specific force of a pose, nominal scale, sensor axes; JobError when the robot is not still.
+Vec3 pose(Session& session, const Calibration& c, double* temperature_degC) {
+  const Stillness still = session.hold_still(kPose_s);
+  (void)gyro_bias(still, c);  // refuses motion
+  *temperature_degC = still.temperature_degC;
+  return c.accel_m_s2_per_count * still.accel;
+}
+
+Result calibrate_accel(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
+  const auto session = bench.open();
+  std::vector<Vec3> poses;
+  std::array<bool, 6> seen{};
+  double temperature = 0.0;
+  for (int tries = 0; tries < kMaxPoses && poses.size() < seen.size(); ++tries) {
+    int next = 0;
+    while (seen[static_cast<std::size_t>(next)]) ++next;
+    session->ask({Request::kFaceUp,
+                  std::string("put the robot down with the IMU's ") +
+                      kFaceNames[static_cast<std::size_t>(next)] +
+                      " side up (or any other side not seen yet), hands off, then press Enter",
+                  next});
+    const Vec3 accel = pose(*session, bench.calibration(), &temperature);
+    const int face = face_up(accel);
+    if (face < 0 || seen[static_cast<std::size_t>(face)]) {
+      std::fprintf(stderr,
+                   face < 0 ? "no side is up to 25 degrees; again\n" : "that side was up before; again\n");
+      continue;
+    }
+    seen[static_cast<std::size_t>(face)] = true;
+    poses.push_back(accel);
+    std::fprintf(stderr, "%s side: %.3f m/s2 (%zu of 6)\n", kFaceNames[static_cast<std::size_t>(face)],
+                 accel.norm(), poses.size());
+  }
+  Vec3 check = Vec3::UnitX() * kGravity_m_s2;
+  if (poses.size() == seen.size()) {
+    session->ask({Request::kTip, "lean the robot against something, on no side, then press Enter"});
+    check = pose(*session, bench.calibration(), &temperature);
+  }
+  const AccelFit fit = fit_six_faces(poses, check);
+  file->accel = {stamp_of(temperature), fit.scale_S, fit.bias_S_m_s2, fit.check_error_m_s2};
+  const double mg = 1000.0 * fit.check_error_m_s2 / kGravity_m_s2;
+  *json = {{"scale", json_of(fit.scale_S)},
+           {"bias_m_s2", json_of(fit.bias_S_m_s2)},
+           {"check_error_mg", mg},
+           {"quality", mg < 5.0    ? "good"
+                       : mg < 15.0 ? "fair"
+                                   : "poor"}};
+  return {
+      format(
+          "accelerometer scale %.4f %.4f %.4f, bias %.3f %.3f %.3f m/s2; off by %.1f mg in a pose it was not "
+          "fitted to",
+          fit.scale_S.x(), fit.scale_S.y(), fit.scale_S.z(), fit.bias_S_m_s2.x(), fit.bias_S_m_s2.y(),
+          fit.bias_S_m_s2.z(), mg),
+      mg < 15.0 ? "" : "the fit is poor: repeat it on a firm table"};
+}
+
+Result calibrate_mount(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
+  const auto session = bench.open();
+  double temperature = 0.0;
+  const auto corrected = [&](const Vec3& a) {
+    return file->accel ? Vec3(file->accel->scale.cwiseProduct(a) - file->accel->bias_m_s2) : a;
+  };
+  session->ask({Request::kUpright, "stand the robot exactly upright, hands off, then press Enter"});
+  const Vec3 upright = corrected(pose(*session, bench.calibration(), &temperature));
+  session->ask({Request::kTip, bench.tip_words() + ", lean it there, then press Enter"});
+  const Vec3 tipped = corrected(pose(*session, bench.calibration(), &temperature));
+  const Mat3 R_BS = mount_rotation(upright, tipped, bench.setup().tip_axis_B);
+  file->mount = {stamp_of(temperature), R_BS};
+  const double off =
+      std::acos(std::clamp(0.5 * ((R_BS * bench.calibration().R_BS.transpose()).trace() - 1.0), -1.0, 1.0)) *
+      180.0 / kPi;
+  nlohmann::json rows = nlohmann::json::array();
+  for (int i = 0; i < 9; ++i) rows.push_back(R_BS(i / 3, i % 3));
+  *json = {{"R_BS", rows}, {"degrees_from_board_file", off}};
+  return {format("the IMU sits %.1f degrees from where the board file says", off), ""};
+}
+
+Result calibrate_motors(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
+  const auto session = bench.open();
+  const double temperature = session->hold_still(0.1).temperature_degC;
+  std::vector<WheelFinding> findings;
+  findings.reserve(static_cast<std::size_t>(bench.layout().wheels));
+  for (int i = 0; i < bench.layout().wheels; ++i)
+    findings.push_back(pulse(*session, bench.layout(), bench.calibration(), i));
+  settle(*session, bench.layout(), &findings);
+  Result result;
+  CalibrationFile::Motors motors{stamp_of(temperature), {}, {}, {}};
+  (*json)["motors"] = nlohmann::json::array();
+  for (const WheelFinding& f : findings) {
+    motors.wheel_of_motor.push_back(*f.wheel + 1);
+    motors.encoder_of_motor.push_back(f.encoder + 1);
+    motors.drive.push_back(f.drive);
+    result.text += (result.text.empty() ? "" : "\n") + describe(f);
+    (*json)["motors"].push_back({{"wheel", *f.wheel + 1},
+                                 {"encoder", f.encoder + 1},
+                                 {"drive", f.drive},
+                                 {"turns_backwards", *f.turns_backwards},
+                                 {"counts_down", f.counts_down},
+                                 {"kick_sigmas", f.kick_sigmas}});
+  }
+  file->motors = motors;
+  result.complaint = complaint(findings);
+  if (!result.complaint.empty()) result.complaint += "; equipoise bringup writes a board file that fits";
+  return result;
+}
+
+Result calibrate_encoders(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
+  const auto session = bench.open();
+  CalibrationFile::Encoders encoders{stamp_of(session->hold_still(0.1).temperature_degC), {}};
+  Result result;
+  for (int wheel = 0; wheel < bench.layout().wheels; ++wheel) {
+    const EncoderFinding found = turn_by_hand(*session, bench.layout(), wheel, kTurns);
+    const double expected = bench.layout().counts_per_rev;
+    encoders.counts_per_rev.push_back(found.counts_per_rev);
+    result.text += (wheel == 0 ? "" : "\n") + format("wheel %d: encoder %d, %.1f counts per turn", wheel + 1,
+                                                     found.encoder + 1, found.counts_per_rev);
+    const auto add = [&](const std::string& line) {
+      result.complaint += (result.complaint.empty() ? "" : "; ") + line;
+    };
+    if (found.encoder != wheel)
+      add(format("wheel %d is counted by encoder %d", wheel + 1, found.encoder + 1));
+    if (found.counts_per_rev < 0.0) add(format("encoder %d counts backwards", found.encoder + 1));
+    if (std::abs(std::abs(found.counts_per_rev) - expected) > kMaxCountsError * expected) {
+      add(format("wheel %d has %.1f counts per turn where calibration.encoder_counts_per_rev says %.1f",
+                 wheel + 1, std::abs(found.counts_per_rev), expected));
+    }
+  }
+  (*json)["counts_per_rev"] = encoders.counts_per_rev;
+  file->encoders = encoders;
+  return result;
+}
+
+int run_calibrate(const Arguments& a) {
+  Workbench bench(a.bench);
+  CalibrationFile file;
+  if (std::filesystem::exists(a.out)) file = load_calibration(a.out, bench.robot());
+  file.robot = bench.robot();
+  file.wheel_count = bench.layout().wheels;
+  nlohmann::json json;
+  const Result result = a.what == "gyro"     ? calibrate_gyro(bench, &file, &json)
+                        : a.what == "accel"  ? calibrate_accel(bench, &file, &json)
+                        : a.what == "mount"  ? calibrate_mount(bench, &file, &json)
+                        : a.what == "motors" ? calibrate_motors(bench, &file, &json)
+                                             : calibrate_encoders(bench, &file, &json);
+  save_calibration(file, a.out);
+  std::FILE* const out = a.json == "-" ? stderr : stdout;
+  std::fprintf(out, "%s\nwritten to %s\n", result.text.c_str(), a.out.c_str());
+  json["what"] = a.what;
+  json["file"] = a.out;
+  json["complaint"] = result.complaint.empty() ? nlohmann::json(nullptr) : nlohmann::json(result.complaint);
+  if (!a.json.empty()) write_json(json, a.json);
+  if (result.complaint.empty()) return 0;
+  std::fprintf(stderr, "equipoise: %s\n", result.complaint.c_str());
+  return 1;
+}
+
+}  // namespace
+
+void add_calibrate(Subcommand app) {
+  const Subcommand command = app.subcommand("calibrate", "Measures a robot at rest or on its stand; keeps the result");
+  auto a = std::make_shared<Arguments>();
+  command.option("what", a->what,
+                   "gyro: bias, 3 s at rest; accel: bias and scale, six sides up; mount: how the board sits; "
+                   "motors: which wheel each turns and which way; encoders: counts per turn, by hand").required().one_of({"gyro", "accel", "mount", "motors", "encoders"});
+  add_options(command, &a->bench);
+  command.option("--out", a->out, "calibration file to add to").show_default();
+  command.option("--json", a->json, "result as JSON, - for stdout");
+  command.action([=] { return run_calibrate(*a); });
+}
+
+}  // namespace equipoise::app

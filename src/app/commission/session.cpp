@@ -1,0 +1,118 @@
+#include "app/commission/session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "equipoise/runtime/monotonic.hpp"
+#include "app/cli/interrupt.hpp"
+
+namespace equipoise::app {
+namespace {
+
+constexpr int kMayMiss = 4;  // samples in a row, as in the self-test
+
+std::string missing_of(const RawSample& raw) {
+  if (!raw.imu_ok) return "the IMU delivers no valid sample";
+  return "an encoder cannot be read";
+}
+
+}  // namespace
+
+RawSample Session::next() {
+  for (int missed = 0;; ++missed) {
+    if (interrupted.load(std::memory_order_relaxed)) throw JobError("interrupted; motors are off");
+    std::int64_t now_ns = 0;
+    const int status = hardware_.wait_tick(&now_ns);
+    if (status != 0) throw JobError(std::string("no tick: ") + std::strerror(-status) + "; motors are off");
+    beat();
+    rio_sensors_t sensors{};
+    if (rio_read_sensors(&io_, &sensors) != 0) sensors.valid = 0;
+    const RawSample raw = from_rio(sensors);
+    if (raw.imu_ok && raw.encoders_ok) {
+      temperature_degC_ = sensors.imu_temperature_degC;
+      return raw;
+    }
+    if (missed >= kMayMiss) throw JobError(missing_of(raw) + " (equipoise doctor finds the cause)");
+  }
+}
+
+int Session::motors_off() noexcept {
+  if (heartbeat_ != nullptr) heartbeat_->want_enable.store(0, std::memory_order_relaxed);
+  return hardware_.motors_off();
+}
+
+void Session::beat() {
+  if (heartbeat_ == nullptr) return;
+  heartbeat_->loop.fetch_add(1, std::memory_order_release);
+  if (!guard_.alive(heartbeat_->guard.load(std::memory_order_acquire), runtime::monotonic_now_ns()))
+    throw JobError("the guard process has died; motors are off");
+}
+
+void Session::off() {
+  if (motors_off() != 0)
+    throw JobError("the motors cannot be switched off: take the battery out, then run equipoise doctor");
+}
+
+RawSample Session::sample() {
+  off();
+  return next();
+}
+
+RawSample Session::drive(const std::array<double, kMaxMotors>& duty) {
+  MotorCommand command;
+  command.duty = duty;
+  command.enable = true;
+  if (heartbeat_ != nullptr) heartbeat_->want_enable.store(1, std::memory_order_relaxed);
+  const int status = hardware_.write(command);
+  try {
+    if (status != 0) throw JobError(std::string("the bridges refuse: ") + std::strerror(-status));
+    return next();
+  } catch (...) {
+    (void)motors_off();
+    throw;
+  }
+}
+
+void Session::rest(double seconds) {
+  for (int i = 0; i < std::lround(seconds * kTickHz); ++i) sample();
+}
+
+Stillness Session::hold_still(double seconds) {
+  const int count = static_cast<int>(std::lround(seconds * kTickHz));
+  Vec3 gyro_squares = Vec3::Zero(), accel_squares = Vec3::Zero(), first_half = Vec3::Zero();
+  std::array<double, kMaxMotors> low{}, high{};
+  Stillness s;
+  for (int n = 0; n < count; ++n) {
+    const RawSample raw = sample();
+    const Eigen::Map<const Vec3> gyro(raw.gyro_counts.data());
+    const Eigen::Map<const Vec3> accel(raw.accel_counts.data());
+    // Welford's means keep the small spread of large numbers.
+    const Vec3 gyro_step = gyro - s.gyro;
+    const Vec3 accel_step = accel - s.accel;
+    s.gyro += gyro_step / (n + 1);
+    s.accel += accel_step / (n + 1);
+    gyro_squares += gyro_step.cwiseProduct(gyro - s.gyro);
+    accel_squares += accel_step.cwiseProduct(accel - s.accel);
+    if (n == count / 2 - 1) first_half = s.gyro;
+    for (std::size_t i = 0; i < kMaxMotors; ++i) {
+      low[i] = n == 0 ? raw.encoder_counts[i] : std::min(low[i], raw.encoder_counts[i]);
+      high[i] = n == 0 ? raw.encoder_counts[i] : std::max(high[i], raw.encoder_counts[i]);
+    }
+  }
+  s.gyro_sigma = (gyro_squares / count).cwiseSqrt();
+  s.accel_sigma = (accel_squares / count).cwiseSqrt();
+  s.gyro_drift = 2.0 * (s.gyro - first_half);  // the whole is the mean of the halves
+  for (std::size_t i = 0; i < kMaxMotors; ++i) s.encoder_travel[i] = high[i] - low[i];
+  s.temperature_degC = temperature_degC_;
+  return s;
+}
+
+std::string Session::ask(const Request& request) {
+  off();
+  std::string answer;
+  if (!ask_(request, &answer)) throw JobError("stopped by the person; nothing was written");
+  return answer;
+}
+
+}  // namespace equipoise::app

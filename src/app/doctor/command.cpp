@@ -1,0 +1,78 @@
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "app/cli/commands.hpp"
+#include "app/doctor/doctor.hpp"
+#include "app/run/firmware.hpp"
+
+namespace equipoise::app {
+namespace {
+
+constexpr std::array<const char*, 4> kVerdictNames{"ok", "warn", "fail", "skipped"};
+
+// cppcheck-suppress CastIntegerToAddressAtReturn  ; an array of names
+const char* name_of(doctor::Verdict verdict) { return kVerdictNames[static_cast<std::size_t>(verdict)]; }
+
+nlohmann::json to_json(const doctor::Patient& patient, const doctor::Findings& findings) {
+  nlohmann::json checks = nlohmann::json::array();
+  for (const doctor::Finding& f : findings.all()) {
+    checks.push_back({{"name", f.name}, {"verdict", name_of(f.verdict)}, {"what", f.what}, {"fix", f.fix}});
+  }
+  return {{"ok", findings.healthy()},
+          {"board", patient.board == nullptr ? nlohmann::json(nullptr) : nlohmann::json(patient.board_path)},
+          {"checks", checks},
+          {"version", version()}};
+}
+
+void print(const doctor::Findings& findings, std::FILE* out) {
+  std::array<int, kVerdictNames.size()> count{};
+  for (const doctor::Finding& f : findings.all()) {
+    ++count[static_cast<std::size_t>(f.verdict)];
+    std::fprintf(out, "%-8s %-20s %s\n", name_of(f.verdict), f.name.c_str(), f.what.c_str());
+    if (!f.fix.empty()) std::fprintf(out, "%-8s %-20s   -> %s\n", "", "", f.fix.c_str());
+  }
+  std::fprintf(out, "%d ok, %d warnings, %d failures, %d skipped\n", count[0], count[1], count[2], count[3]);
+}
+
+struct Arguments {
+  std::string board;
+  std::string key;
+  std::string json;
+  std::string root;
+};
+
+int run_doctor(const Arguments& a) {
+  doctor::Patient patient;
+  Board board;
+  if (!a.board.empty()) {
+    board = load_board(a.board);
+    patient.board = &board;
+    patient.board_path = a.board;
+  }
+  if (!a.root.empty()) {
+    if (!std::filesystem::is_directory(a.root)) throw InputError("--root " + a.root + ": no such directory");
+    patient.root = std::filesystem::canonical(a.root).string();
+  }
+  patient.key = a.key;
+  const doctor::Findings findings = doctor::examine(patient);
+  print(findings, a.json == "-" ? stderr : stdout);
+  if (!a.json.empty()) write_json(to_json(patient, findings), a.json);
+  return findings.healthy() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_doctor(Subcommand app) {
+  const Subcommand command = app.subcommand(
+      "doctor", "Finds what keeps this machine from flying a robot, and the command that mends it");
+  auto a = std::make_shared<Arguments>();
+  command.option("--board", a->board, "wiring, TOML: also look at everything it names");
+  command.option("--command-key", a->key, "also look at this key file of run and send");
+  command.option("--json", a->json, "findings as JSON, - for stdout");
+  command.option("--root", a->root, "look at /sys, /proc and /dev below this directory, e.g. of a test");
+  command.action([=] { return run_doctor(*a); });
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,67 @@
+// What keeps this machine from flying a robot: kernel, device tree, pins, chips, permissions, limits.
+// In: file system root ("" is the machine), board file, key -> out: findings, each with the command that
+// mends it. Changes nothing on the machine but reads of the IMU's identity. Start-up only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/board/board.hpp"
+
+namespace equipoise::app::doctor {
+
+enum class Verdict { kOk, kWarn, kFail, kSkipped };
+
+struct Finding {
+  std::string name;  // what was looked at: "imu.chip"
+  Verdict verdict;
+  std::string what;  // found
+  std::string fix;   // a command to copy, or what to do; empty when nothing has to be done
+};
+
+class Findings {
+ public:
+  void ok(const std::string& name, const std::string& what) { add({name, Verdict::kOk, what, ""}); }
+  void warn(const std::string& name, const std::string& what, const std::string& fix) {
+    add({name, Verdict::kWarn, what, fix});
+  }
+  void fail(const std::string& name, const std::string& what, const std::string& fix) {
+    add({name, Verdict::kFail, what, fix});
+  }
+  void skip(const std::string& name, const std::string& what, const std::string& fix = "") {
+    add({name, Verdict::kSkipped, what, fix});
+  }
+  const std::vector<Finding>& all() const { return all_; }
+  bool healthy() const;  // nothing fails
+
+ private:
+  void add(Finding finding) { all_.push_back(std::move(finding)); }
+
+  std::vector<Finding> all_;
+};
+
+struct Patient {
+  std::string root;              // "": this machine; a directory in tests
+  const Board* board = nullptr;  // null: no robot asked for
+  std::string board_path;
+  std::string key;  // command key file; empty: none
+
+  std::string path(const std::string& absolute) const { return root + absolute; }
+};
+
+/// Loads our overlay, which sets every pin and enables every device that a board file names.
+extern const char* const kOverlayFix;
+/// Lets the user who asks at the devices; takes effect at the next login.
+extern const char* const kGroupFix;
+
+void examine_kernel(const Patient& patient, Findings* findings);   // kernel, device tree, clock
+void examine_process(const Patient& patient, Findings* findings);  // limits, LCM route, key
+void examine_buses(const Patient& patient, Findings* findings);    // I2C, counters, PWM, ADC, serial, CAN
+void examine_pins(const Patient& patient, Findings* findings);     // pinmux, GPIO chips and lines
+
+Findings examine(const Patient& patient);
+
+/// First line of a file, or of a device tree string; empty where there is none.
+std::string first_line(const std::string& path);
+
+}  // namespace equipoise::app::doctor

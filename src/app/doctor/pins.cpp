@@ -1,0 +1,175 @@
+// GPIO chips and lines, and what the pads of all pins are switched to.
+#include <fcntl.h>
+#include <linux/gpio.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "app/board/am335x.hpp"
+#include "app/doctor/doctor.hpp"
+#include "sysfs.h"
+
+namespace equipoise::app::doctor {
+namespace {
+
+constexpr const char* kOurs = "equipoise";  // as the drivers sign their requests
+
+struct Line {
+  std::string use;  // "motor 1 in1"
+  std::string chip;
+  std::uint32_t line;
+  bool input;
+};
+
+std::vector<Line> lines_of(const Board& board) {
+  std::vector<Line> lines;
+  const auto pin = [&lines](const std::string& use, const bbb_pin_t& p, bool input) {
+    if (p.used) lines.push_back({use, p.chip, p.line, input});
+  };
+  const auto line = [&lines](const std::string& use, const BoardLine& l, bool input) {
+    lines.push_back({use, l.chip, static_cast<std::uint32_t>(l.line), input});
+  };
+  pin("[bridges] enable", board.wiring.enable, false);
+  pin("[imu] interrupt", board.wiring.imu.interrupt, true);
+  for (std::uint32_t i = 0; i < board.wiring.motors; ++i) {
+    const std::string motor = "motor " + std::to_string(i + 1) + " ";
+    pin(motor + "in1", board.wiring.motor[i].in1, false);
+    pin(motor + "in2", board.wiring.motor[i].in2, false);
+    pin(motor + "fault", board.wiring.motor[i].fault, true);
+  }
+  line("[leds] red", board.led_red, false);
+  line("[leds] green", board.led_green, false);
+  for (const BoardLine& bar : board.led_bars) line("[leds] bars", bar, false);
+  line("[buttons] pause", board.button_pause, true);
+  line("[buttons] mode", board.button_mode, true);
+  return lines;
+}
+
+/// Who holds a line; empty: nobody, or the kernel does not say.
+std::string holder_of(const std::string& chip_path, std::uint32_t line) {
+  const int fd = open(chip_path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return "";
+  gpio_v2_line_info info{};
+  info.offset = line;
+  const bool asked = ioctl(fd, GPIO_V2_GET_LINEINFO_IOCTL, &info) == 0;
+  close(fd);
+  if (!asked || (info.flags & GPIO_V2_LINE_FLAG_USED) == 0) return "";
+  return info.consumer[0] == '\0' ? "a kernel driver" : info.consumer;
+}
+
+void examine_line(const Patient& patient, Findings* findings, const Line& line) {
+  const std::string name = "gpio." + line.chip + "." + std::to_string(line.line);
+  char dir[SYSFS_PATH_MAX];
+  if (sysfs_find(patient.path("/sys/bus/gpio/devices").c_str(), "gpiochip", line.chip.c_str(), dir) < 0) {
+    findings->fail(
+        name, line.use + ": no gpio chip \"" + line.chip + "\"",
+        "gpiodetect; ls -l /sys/bus/gpio/devices  # then correct the board file " + patient.board_path);
+    return;
+  }
+  const std::string device = patient.path("/dev/" + std::string(std::strrchr(dir, '/') + 1));
+  if (access(device.c_str(), R_OK | W_OK) != 0) {
+    findings->fail(name, line.use + ": " + device + ": " + std::strerror(errno), kGroupFix);
+    return;
+  }
+  const std::string holder = holder_of(device, line.line);
+  if (holder == kOurs) {
+    findings->warn(name, line.use + ": held by a running equipoise", "sudo systemctl stop equipoise");
+  } else if (!holder.empty()) {
+    findings->fail(name, line.use + ": held by \"" + holder + "\"", kOverlayFix);
+  } else {
+    findings->ok(name, line.use + ": free");
+  }
+}
+
+/// Pad control registers, as pinctrl-single prints them: "pin 18 (PIN18) ... 44e10848 00000006
+/// pinctrl-single".
+std::map<std::uint32_t, std::uint32_t> read_pads(const std::string& path) {
+  constexpr std::uint32_t kControlModule = 0x44e10000;
+  std::map<std::uint32_t, std::uint32_t> pads;
+  std::ifstream file(path);
+  std::string line;
+  while (std::getline(file, line)) {
+    std::istringstream words(line);
+    std::string word;
+    while (words >> word) {
+      if (word.size() != 8 || word.compare(0, 5, "44e10") != 0) continue;
+      std::string value;
+      words >> value;
+      const auto address = static_cast<std::uint32_t>(std::strtoul(word.c_str(), nullptr, 16));
+      pads[address - kControlModule] = static_cast<std::uint32_t>(std::strtoul(value.c_str(), nullptr, 16));
+      break;
+    }
+  }
+  return pads;
+}
+
+struct Use {
+  std::string use;
+  std::vector<Pad> pads;
+};
+
+std::vector<Use> uses_of(const Board& board) {
+  std::vector<Use> uses;
+  uses.push_back({"[imu] bus", pads_of_port(board.wiring.imu.bus)});
+  for (std::uint32_t i = 0; i < board.wiring.motors; ++i) {
+    const bbb_motor_t& motor = board.wiring.motor[i];
+    const std::string name = "motor " + std::to_string(i + 1) + " ";
+    uses.push_back({name + "pwm", pads_of_pwm(motor.pwm, motor.pwm_channel)});
+    uses.push_back({name + "encoder", pads_of_encoder(motor.encoder)});
+  }
+  for (const Line& line : lines_of(board))
+    uses.push_back({line.use, pads_of_gpio(line.chip, line.line, line.input)});
+  uses.push_back({"[serial] device", pads_of_port(board.serial_device)});
+  uses.push_back({"[can] interface", pads_of_port(board.can_interface)});
+  return uses;
+}
+
+void examine_pad(Findings* findings, const std::string& use, const Pad& pad,
+                 const std::map<std::uint32_t, std::uint32_t>& pads) {
+  const std::string name = "pinmux." + pad.pin;
+  const auto found = pads.find(pad.offset);
+  if (found == pads.end()) {
+    findings->skip(name, use + ": the kernel does not list its pad");
+    return;
+  }
+  const std::uint32_t mode = found->second & 7U;
+  const bool deaf = pad.input && (found->second & kPadReceiver) == 0;
+  if (mode != pad.mode) {
+    findings->fail(
+        name, use + ": pad is in mode " + std::to_string(mode) + ", needs mode " + std::to_string(pad.mode),
+        kOverlayFix);
+  } else if (deaf) {
+    findings->fail(name, use + ": the pad's receiver is off, it reads nothing", kOverlayFix);
+  } else {
+    findings->ok(name, use + ": mode " + std::to_string(mode));
+  }
+}
+
+void examine_pinmux(const Patient& patient, Findings* findings) {
+  const std::string pins = patient.path("/sys/kernel/debug/pinctrl/44e10800.pinmux-pinctrl-single/pins");
+  const auto pads = read_pads(pins);
+  if (pads.empty()) {
+    findings->skip("pinmux", "only root may read what the pins are switched to",
+                   "sudo equipoise doctor --board " + patient.board_path);
+    return;
+  }
+  for (const Use& use : uses_of(*patient.board)) {
+    for (const Pad& pad : use.pads) examine_pad(findings, use.use, pad, pads);
+  }
+}
+
+}  // namespace
+
+void examine_pins(const Patient& patient, Findings* findings) {
+  for (const Line& line : lines_of(*patient.board)) examine_line(patient, findings, line);
+  examine_pinmux(patient, findings);
+}
+
+}  // namespace equipoise::app::doctor

@@ -1,0 +1,142 @@
+// What this user's processes may do: real-time limits, multicast, keys.
+#include <arpa/inet.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "app/doctor/doctor.hpp"
+#include "equipoise/runtime/command_auth.hpp"
+#include "equipoise/runtime/realtime.hpp"
+
+namespace equipoise::app::doctor {
+namespace {
+
+constexpr const char* kTelemetryGroup = "239.255.76.67";  // of runtime::kDefaultTelemetryUrl
+constexpr int kCapIpcLock = 14;                           // <linux/capability.h>
+constexpr int kCapSysNice = 23;
+
+/// Soft limit of /proc/self/limits, e.g. "Max realtime priority"; -1: unlimited.
+std::int64_t soft_limit(const Patient& patient, const std::string& name) {
+  std::ifstream file(patient.path("/proc/self/limits"));
+  std::string line;
+  while (std::getline(file, line)) {
+    if (line.compare(0, name.size(), name) != 0) continue;
+    std::istringstream rest(line.substr(name.size()));
+    std::string value;
+    rest >> value;
+    return value == "unlimited" ? -1 : std::strtoll(value.c_str(), nullptr, 10);
+  }
+  return 0;
+}
+
+bool has_capability(const Patient& patient, int bit) {
+  std::ifstream file(patient.path("/proc/self/status"));
+  std::string line;
+  while (std::getline(file, line)) {
+    if (line.compare(0, 7, "CapEff:") == 0)
+      return ((std::strtoull(line.c_str() + 7, nullptr, 16) >> bit) & 1U) != 0;
+  }
+  return false;
+}
+
+/// `needed` or more, or the capability that makes the limit irrelevant.
+void examine_limit(const Patient& patient, Findings* findings, const std::string& name,
+                   const std::string& limit, std::int64_t needed, int capability, const std::string& line) {
+  const std::int64_t value = soft_limit(patient, limit);
+  const std::string text = value < 0 ? "unlimited" : std::to_string(value);
+  if (value < 0 || value >= needed || has_capability(patient, capability)) {
+    findings->ok(name, limit + " " + text + (has_capability(patient, capability) ? " (privileged)" : ""));
+    return;
+  }
+  const std::string what = limit + " is " + text + ", the loop needs " + std::to_string(needed);
+  const std::string fix =
+      "echo '" + line + "' | sudo tee -a /etc/security/limits.d/equipoise.conf  # then " + "log in again";
+  if (patient.board == nullptr) {
+    findings->warn(name, what + " on a robot", fix);
+  } else {
+    findings->fail(name, what, fix);
+  }
+}
+
+void examine_limits(const Patient& patient, Findings* findings) {
+  examine_limit(patient, findings, "limits.rtprio", "Max realtime priority", runtime::kGuardPriority,
+                kCapSysNice, "@equipoise - rtprio 99");
+  constexpr std::int64_t kLocked_bytes = 256 << 20;  // code, stacks and the log queue, generously
+  examine_limit(patient, findings, "limits.memlock", "Max locked memory", kLocked_bytes, kCapIpcLock,
+                "@equipoise - memlock unlimited");
+  const std::string idle = patient.path("/dev/cpu_dma_latency");
+  if (patient.board == nullptr) return;
+  if (access(idle.c_str(), R_OK | W_OK) == 0) {
+    findings->ok("limits.cpu_idle", "/dev/cpu_dma_latency may be held");
+  } else {
+    findings->warn("limits.cpu_idle",
+                   "/dev/cpu_dma_latency cannot be opened: wake-ups from deep idle are slow", kGroupFix);
+  }
+}
+
+/// Any route that takes the telemetry group, the default route included.
+bool has_route(const Patient& patient, std::string* interface) {
+  std::ifstream file(patient.path("/proc/net/route"));
+  const std::uint32_t group = inet_addr(kTelemetryGroup);  // network order, as the kernel prints it
+  std::string line;
+  std::getline(file, line);
+  while (std::getline(file, line)) {
+    std::istringstream fields(line);
+    std::string name, destination, gateway, flags, used, uses, metric, mask;
+    if (!(fields >> name >> destination >> gateway >> flags >> used >> uses >> metric >> mask)) continue;
+    const auto number = [](const std::string& hex) {
+      return static_cast<std::uint32_t>(std::strtoul(hex.c_str(), nullptr, 16));
+    };
+    if ((group & number(mask)) == number(destination)) {
+      *interface = name;
+      return true;
+    }
+  }
+  return false;
+}
+
+void examine_route(const Patient& patient, Findings* findings) {
+  std::string interface;
+  if (has_route(patient, &interface)) {
+    findings->ok("lcm.route", std::string(kTelemetryGroup) + " goes out through " + interface);
+  } else {
+    findings->warn("lcm.route",
+                   std::string("no route to ") + kTelemetryGroup + ": no telemetry, only the log",
+                   "sudo ip link set lo up && sudo ip route add 224.0.0.0/4 dev lo");
+  }
+}
+
+void examine_key(const Patient& patient, Findings* findings) {
+  if (patient.key.empty()) {
+    findings->skip("command.key", "no key file given", "equipoise doctor --command-key FILE");
+    return;
+  }
+  try {
+    runtime::CommandKey::load(patient.key);
+    findings->ok("command.key", patient.key + " is a key that only its owner reads");
+  } catch (const std::runtime_error& error) {
+    namespace fs = std::filesystem;
+    std::error_code missing;
+    const fs::perms mode = fs::status(patient.key, missing).permissions();
+    const bool open_to_others = !missing && fs::exists(patient.key) &&
+                                (mode & (fs::perms::group_all | fs::perms::others_all)) != fs::perms::none;
+    findings->fail("command.key", error.what(),
+                   open_to_others
+                       ? "chmod 600 " + patient.key
+                       : "equipoise keygen NEWFILE  # and give the same file to those who send commands");
+  }
+}
+
+}  // namespace
+
+void examine_process(const Patient& patient, Findings* findings) {
+  examine_limits(patient, findings);
+  examine_route(patient, findings);
+  examine_key(patient, findings);
+}
+
+}  // namespace equipoise::app::doctor

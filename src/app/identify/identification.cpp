@@ -1,0 +1,275 @@
+#include "app/identify/identification.hpp"
+
+#include <limits>
+
+#include "app/identify/least_squares.hpp"
+
+namespace equipoise::app {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::size_t kMinSamples = 200;
+constexpr double kMoving_rad_s = 0.5;
+constexpr double kCreeping_rad_s = 0.1;
+constexpr double kStribeck_rad_s = 1.0;
+
+double sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
+
+double sample_s(const BenchLog& log) {
+  return (log.rows.back().t_s - log.rows.front().t_s) / static_cast<double>(log.rows.size() - 1);
+}
+
+/// Mean rate over the sample that ends at i.
+double rate(const BenchLog& log, std::size_t i) {
+  return (log.rows[i].angle_rad - log.rows[i - 1].angle_rad) / (log.rows[i].t_s - log.rows[i - 1].t_s);
+}
+
+/// Why the samples cannot be used at all; `electrical`: current and supply are needed.
+std::string unusable(const BenchLog& log, bool electrical) {
+  if (log.rows.size() < kMinSamples) {
+    return "the log has " + std::to_string(log.rows.size()) + " samples; record at least " +
+           std::to_string(kMinSamples);
+  }
+  double largest_u = 0.0;
+  for (std::size_t i = 0; i < log.rows.size(); ++i) {
+    const BenchSample& s = log.rows[i];
+    const std::string where = " at sample " + std::to_string(i);
+    if (!std::isfinite(s.u)) return "u is not a number" + where;
+    if (!std::isfinite(s.angle_rad)) return "angle_rad is not a number" + where;
+    if (electrical && !std::isfinite(s.current_A))
+      return "current_A is not measured" + where + "; the bench needs a current sensor";
+    if (electrical && !(s.supply_V > 0.0)) return "supply_V is not positive" + where;
+    largest_u = std::max(largest_u, std::abs(s.u));
+  }
+  if (largest_u < 0.02) return "the motors are never driven: |u| stays below 0.02";
+  return "";
+}
+
+/// Electrical regression over windows of at least 50 us: means of voltage, current, speed; change of the
+/// current between the window's ends, which are halfway between samples.
+LeastSquares electrical_fit(const BenchLog& log) {
+  constexpr double kWindow_s = 50e-6;
+  const auto w = static_cast<std::size_t>(std::max(1.0, std::round(kWindow_s / sample_s(log))));
+  const auto n = static_cast<Index>((log.rows.size() - 2) / w);
+  Eigen::MatrixXd A(n, 3);
+  Eigen::VectorXd b(n);
+  for (Index j = 0; j < n; ++j) {
+    const std::size_t first = 1 + static_cast<std::size_t>(j) * w;
+    const std::size_t last = first + w - 1;
+    double current = 0.0;
+    double voltage = 0.0;
+    for (std::size_t i = first; i <= last; ++i) {
+      current += log.rows[i].current_A;
+      voltage += log.rows[i].u * log.rows[i].supply_V;
+    }
+    const auto count = static_cast<double>(w);
+    const double time = log.rows[last].t_s - log.rows[first - 1].t_s;
+    const double di = 0.5 * (log.rows[last + 1].current_A + log.rows[last].current_A -
+                             log.rows[first].current_A - log.rows[first - 1].current_A);
+    A(j, 0) = current / count;
+    A(j, 1) = (log.rows[last].angle_rad - log.rows[first - 1].angle_rad) / time;
+    A(j, 2) = di / time;
+    b(j) = voltage / count;
+  }
+  return least_squares(A, b);
+}
+
+/// Measured current over (4.3)'s where the command is small: coasting bridges lose current there, braking
+/// ones do not.
+double gain_at_small_duty(const BenchLog& log, double R, double k) {
+  double predicted_sq = 0.0;
+  double product = 0.0;
+  for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    const BenchSample& s = log.rows[i];
+    if (std::abs(s.u) > 0.4) continue;
+    const double linear = (s.u * s.supply_V - k * rate(log, i)) / R;
+    predicted_sq += linear * linear;
+    product += linear * s.current_A;
+  }
+  return predicted_sq > 0.0 ? product / predicted_sq : 1.0;
+}
+
+/// Means under the triangular weight with which the difference of two mean rates is the mean acceleration.
+struct Window {
+  double acceleration = 0.0;
+  double rate = 0.0;
+  double current_A = 0.0;
+  double u = 0.0;
+};
+
+/// Mean rate over the samples from `first` to `last`.
+double slope(const BenchLog& log, std::size_t first, std::size_t last) {
+  const BenchSample& a = log.rows[first];
+  const BenchSample& b = log.rows[last];
+  return (b.angle_rad - a.angle_rad) / (b.t_s - a.t_s);
+}
+
+/// Whether the shaft turns one way, fast enough, in every quarter of the window: across a reversal the sign
+/// of friction changes.
+bool moves_throughout(const BenchLog& log, std::size_t first, std::size_t last, double min_rate_rad_s) {
+  const std::size_t quarter = (last - first) / 4;
+  const double direction = sign(slope(log, first, last));
+  for (std::size_t at = first; at + quarter <= last; at += quarter) {
+    if (direction * slope(log, at, at + quarter) <= min_rate_rad_s) return false;
+  }
+  return true;
+}
+
+std::vector<Window> windows_in_motion(const BenchLog& log, double min_rate_rad_s) {
+  constexpr std::size_t kHalf = 10;
+  std::vector<Window> windows;
+  for (std::size_t i = kHalf + 1; i + kHalf < log.rows.size(); ++i) {
+    const std::size_t first = i - kHalf;
+    const std::size_t last = i + kHalf;
+    if (!moves_throughout(log, first, last, min_rate_rad_s)) continue;
+    Window w;
+    w.acceleration =
+        2.0 * (slope(log, i, last) - slope(log, first, i)) / (log.rows[last].t_s - log.rows[first].t_s);
+    double weights = 0.0;
+    for (std::size_t m = first + 1; m <= last; ++m) {
+      const double from_centre = std::abs(static_cast<double>(m) - static_cast<double>(i) - 0.5);
+      const double weight = static_cast<double>(kHalf) - from_centre;
+      w.rate += weight * rate(log, m);
+      w.current_A += weight * log.rows[m].current_A;
+      w.u += weight * log.rows[m].u;
+      weights += weight;
+    }
+    w.rate /= weights;
+    w.current_A /= weights;
+    w.u /= weights;
+    windows.push_back(w);
+  }
+  return windows;
+}
+
+/// Coulomb and viscous friction at the motor's output, and the inertia unless it is known.
+void add_motor_friction(const BenchLog& log, double k, double inertia_kg_m2, Identified* out) {
+  const std::vector<Window> windows = windows_in_motion(log, kMoving_rad_s);
+  if (windows.size() < kMinSamples) return;
+  const bool known = inertia_kg_m2 > 0.0;
+  const auto n = static_cast<Index>(windows.size());
+  Eigen::MatrixXd A(n, known ? 2 : 3);
+  Eigen::VectorXd b(n);
+  for (Index j = 0; j < n; ++j) {
+    const Window& w = windows[static_cast<std::size_t>(j)];
+    A(j, 0) = sign(w.rate);
+    A(j, 1) = w.rate;
+    b(j) = k * w.current_A;
+    if (known) {
+      b(j) -= inertia_kg_m2 * w.acceleration;
+    } else {
+      A(j, 2) = w.acceleration;
+    }
+  }
+  const LeastSquares fit = least_squares(A, b);
+  out->r_squared_torque = fit.r_squared;
+  out->estimates.push_back({"coulomb_friction_N_m", fit.x(0), fit.half_width(0)});
+  out->estimates.push_back({"viscous_friction_N_m_s", fit.x(1), fit.half_width(1)});
+  if (!known) out->estimates.push_back({"inertia_kg_m2", fit.x(2), fit.half_width(2)});
+}
+
+/// Regressors of the friction rig: command, -(viscous), -(Coulomb, one or by direction), -(Stribeck excess).
+Eigen::MatrixXd friction_regressors(const std::vector<Window>& windows, const FrictionRig& rig) {
+  const double ratio = rig.flywheel_over_ball_radius;
+  const Index directions = rig.separate_directions ? 2 : 1;
+  const auto n = static_cast<Index>(windows.size());
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, 2 + directions + (rig.stribeck ? 1 : 0));
+  for (Index j = 0; j < n; ++j) {
+    const Window& w = windows[static_cast<std::size_t>(j)];
+    const double ball_rate = ratio * w.rate;
+    A(j, 0) = rig.k1_N_m * w.u - rig.k2_ball_N_m_s * ball_rate;
+    A(j, 1) = -ball_rate;
+    A(j, 2 + (directions == 2 && ball_rate < 0.0 ? 1 : 0)) = -sign(ball_rate);
+    const double slow = ball_rate / kStribeck_rad_s;
+    if (rig.stribeck) A(j, A.cols() - 1) = -sign(ball_rate) * std::exp(-slow * slow);
+  }
+  return A;
+}
+
+/// Torques that nobody measures move the flywheel: its acceleration carries the noise, so it is the one
+/// explained. This turns the coefficients, which come divided by the inertia, into inertia and torques.
+void undo_division_by_inertia(LeastSquares* fit) {
+  const double inverse = fit->x(0);
+  for (Index i = 1; i < fit->x.size(); ++i) {
+    fit->x(i) /= inverse;
+    fit->half_width(i) /= std::abs(inverse);
+  }
+  fit->x(0) = 1.0 / inverse;
+  fit->half_width(0) /= inverse * inverse;
+}
+
+}  // namespace
+
+Identified identify_motor(const BenchLog& log, double inertia_kg_m2) {
+  Identified out;
+  out.refused = unusable(log, true);
+  if (!out.refused.empty()) return out;
+  if (log.bridge == LoggedBridge::kDriveCoast) {
+    out.refused =
+        "the log was recorded in drive/coast mode, where voltage and current are not in a linear relation; "
+        "record it with the driver in drive/brake mode";
+    return out;
+  }
+  const LeastSquares e = electrical_fit(log);
+  const double R = e.x(0);
+  const double k = e.x(1);
+  out.r_squared = e.r_squared;
+  constexpr double kSuspicious = 0.85;
+  if (R <= 0.0 || (std::abs(k) > e.half_width(1) && gain_at_small_duty(log, R, k) < kSuspicious)) {
+    out.refused =
+        "at small duty the current is far below (u V - k omega)/R: the bridge coasts; record the log with "
+        "the driver in drive/brake mode";
+    return out;
+  }
+  out.estimates = {{"resistance_ohm", R, e.half_width(0)},
+                   {"torque_constant_N_m_A", k, e.half_width(1)},
+                   {"inductance_H", e.x(2), e.half_width(2)}};
+  // A current that settles within two samples leaves no trace of L.
+  if (e.x(2) < 2.0 * R * sample_s(log)) {
+    out.estimates[2].half_width = std::numeric_limits<double>::infinity();
+  }
+  if (out.estimates[1].determined()) add_motor_friction(log, k, inertia_kg_m2, &out);
+  return out;
+}
+
+Identified identify_friction(const BenchLog& log, const FrictionRig& rig) {
+  Identified out;
+  out.refused = unusable(log, false);
+  if (!out.refused.empty()) return out;
+  const double least = rig.stribeck ? kCreeping_rad_s : kMoving_rad_s;  // of the ball
+  const std::vector<Window> windows = windows_in_motion(log, least / rig.flywheel_over_ball_radius);
+  if (windows.size() < kMinSamples) {
+    out.refused = "the flywheel hardly moves: " + std::to_string(windows.size()) +
+                  " usable samples; drive it with a larger or longer sweep";
+    return out;
+  }
+  Eigen::VectorXd acceleration(static_cast<Index>(windows.size()));
+  for (Index j = 0; j < acceleration.size(); ++j) {
+    acceleration(j) = windows[static_cast<std::size_t>(j)].acceleration / rig.flywheel_over_ball_radius;
+  }
+  LeastSquares fit = least_squares(friction_regressors(windows, rig), acceleration);
+  out.r_squared = fit.r_squared;
+  if (fit.x(0) <= 0.0) {
+    out.refused = "the flywheel accelerates against the command; check the sign of u or of the encoder";
+    return out;
+  }
+  undo_division_by_inertia(&fit);
+  const auto add = [&](const std::string& name, Index i) {
+    out.estimates.push_back({name, fit.x(i), fit.half_width(i)});
+  };
+  add("flywheel_inertia_kg_m2", 0);
+  add("viscous_friction_N_m_s", 1);
+  if (rig.separate_directions) {
+    add("coulomb_friction_positive_N_m", 2);
+    add("coulomb_friction_negative_N_m", 3);
+    out.estimates.push_back({"coulomb_friction_N_m", 0.5 * (fit.x(2) + fit.x(3)),
+                             0.5 * std::hypot(fit.half_width(2), fit.half_width(3))});
+  } else {
+    add("coulomb_friction_N_m", 2);
+  }
+  if (rig.stribeck) add("stribeck_excess_N_m", fit.x.size() - 1);
+  return out;
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,29 @@
+// One simulated run of a robot through the production pipeline and the hardware boundary.
+// In: configuration, choices, options -> out: summary; every tick is handed to `observe`. Same seed, same
+// numbers.
+#pragma once
+
+#include <atomic>
+#include <functional>
+
+#include "app/run/firmware.hpp"
+#include "app/sim/run_meter.hpp"
+
+namespace equipoise::app {
+
+struct SimOptions {
+  double yaw_rate_rad_s = 0.0;
+  double drive_mps = 0.0;
+  double duration_s = 30.0;
+  std::uint64_t seed = 1;
+};
+
+using TickObserver = std::function<void(const runtime::TickRecord&)>;
+
+/// `choice.fidelity` names the world, `choice.controller` the pipeline. Defined in fly.hpp, instantiated once
+/// per robot in simulate_*.cpp.
+template <class Firmware>
+SimSummary simulate(const typename Firmware::Config& configured, const Choice& choice,
+                    const SimOptions& options, const TickObserver& observe, const std::atomic<bool>& stop);
+
+}  // namespace equipoise::app

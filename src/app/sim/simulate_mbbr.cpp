@@ -1,0 +1,8 @@
+#include "app/sim/fly.hpp"
+
+namespace equipoise::app {
+
+template SimSummary simulate<MbbrFirmware>(const MbbrConfig&, const Choice&, const SimOptions&,
+                                           const TickObserver&, const std::atomic<bool>&);
+
+}  // namespace equipoise::app

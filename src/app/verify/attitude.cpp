@@ -1,0 +1,37 @@
+#include "equipoise/sense/attitude_filter.hpp"
+#include "app/verify/rows.hpp"
+
+namespace equipoise::app {
+
+void add_attitude(Subcommand app) {
+  const Subcommand command = app.subcommand("attitude", "Runs our attitude filter on rows of IMU samples");
+  auto in = std::make_shared<std::string>();
+  auto json = std::make_shared<std::string>("-");
+  auto rate_hz = std::make_shared<double>(kTickHz);
+  auto arm = std::make_shared<std::vector<double>>(3, 0.0);
+  auto average_s = std::make_shared<double>(AttitudeFilterParams{}.accel_time_constant_s);
+  command.option("--in", *in,
+                   "rows {gyro_rad_s, accel_m_s2}, body axes, specific force; mag, any unit, optional").required();
+  command.option("--rate-hz", *rate_hz, "of the rows").show_default().range(10.0, 10e3);
+  command.option("--lever-arm-m", *arm, "from the point that moves least to the IMU: x y z").count(3);
+  command.option("--accel-time-constant-s", *average_s, "over which the specific force is averaged").show_default().range(0.1, 100.0);
+  command.option("--json", *json, "rows {q_wxyz, gyro_bias_rad_s}; output file, - for stdout").show_default();
+  command.action([=] {
+    AttitudeFilterParams params;
+    params.tick_s = 1.0 / *rate_hz;
+    params.lever_arm_B_m = Eigen::Map<const Vec3>(arm->data());
+    params.accel_time_constant_s = *average_s;
+    AttitudeFilter filter(params);
+    const auto step = [&](const nlohmann::json& row) -> nlohmann::json {
+      filter.update(vector_at<3>(row, "gyro_rad_s"), vector_at<3>(row, "accel_m_s2"));
+      if (row.contains("mag")) filter.update_magnetometer(vector_at<3>(row, "mag"));
+      const Eigen::Quaterniond q = filter.q_EB();
+      return {{"q_wxyz", {q.w(), q.x(), q.y(), q.z()}},
+              {"gyro_bias_rad_s", array_of<3>(filter.gyro_bias_B_rad_s())}};
+    };
+    write_json(map_rows(*in, step), *json);
+    return 0;
+  });
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,79 @@
+#include <functional>
+#include <map>
+
+#include "robots/mbbr/dynamics.hpp"
+#include "robots/mip/dynamics.hpp"
+#include "app/verify/rows.hpp"
+
+namespace equipoise::app {
+namespace {
+
+nlohmann::json evaluate_mbbr(const MbbrDynamics& dynamics, const nlohmann::json& row) {
+  const Vec2 theta_xy = vector_at<2>(row, "theta_xy");
+  const Vec3 theta_dot = vector_at<3>(row, "theta_dot");
+  const Vec3 tau_B = vector_at<3>(row, "tau_B");
+  const MbbrMotion m(theta_xy, body_rates(theta_xy, theta_dot), vector_at<2>(row, "phi_star_dot"));
+  const MbbrAccelerations a = dynamics.accelerations(m, tau_B);
+  Vec<5> qdd;
+  qdd << MbbrDynamics::theta_ddot(m, a), MbbrDynamics::phi_star_ddot(m, a);
+  return {{"theta_xy", array_of<2>(theta_xy)},
+          {"theta_dot", array_of<3>(theta_dot)},
+          {"phi_star_dot", array_of<2>(m.phi_dot_star)},
+          {"tau_B", array_of<3>(tau_B)},
+          {"qdd", array_of<5>(qdd)},
+          {"gyro_B", array_of<3>(m.omega_B)},
+          {"encoder_rate_B", array_of<3>(MbbrDynamics::encoder_rate_B(m))},
+          {"accel_B", array_of<3>(dynamics.accelerometer_B(m, a))}};
+}
+
+nlohmann::json evaluate_mip(const MipDynamics& dynamics, const nlohmann::json& row) {
+  MipMotion m;
+  m.theta = number_at(row, "theta");
+  m.theta_dot = number_at(row, "theta_dot");
+  m.phi_dot = number_at(row, "phi_dot");
+  m.psi_dot = number_at(row, "psi_dot");
+  const double u_x = number_at(row, "u_x");
+  const double u_z = number_at(row, "u_z");
+  const Vec3 qdd = dynamics.accelerations_from_inputs(m, u_x, u_z);
+  return {{"theta", m.theta},
+          {"theta_dot", m.theta_dot},
+          {"phi_dot", m.phi_dot},
+          {"psi_dot", m.psi_dot},
+          {"u_x", u_x},
+          {"u_z", u_z},
+          {"qdd", array_of<3>(qdd)},
+          {"accel_B", array_of<3>(dynamics.accelerometer_B(m, qdd))}};
+}
+
+using Model = std::function<nlohmann::json(const nlohmann::json&)>;
+
+/// By the robot's name.
+const std::map<std::string, Model>& models() {
+  static const std::map<std::string, Model> all{
+      {"mbbr", [dynamics = MbbrDynamics{MbbrParameters{}}](
+                   const nlohmann::json& row) { return evaluate_mbbr(dynamics, row); }},
+      {"mip", [dynamics = MipDynamics{MipParameters{}}](const nlohmann::json& row) {
+         return evaluate_mip(dynamics, row);
+       }}};
+  return all;
+}
+
+}  // namespace
+
+void add_model(Subcommand app) {
+  const Subcommand command = app.subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON");
+  auto robot = std::make_shared<std::string>();
+  auto in = std::make_shared<std::string>();
+  auto json = std::make_shared<std::string>("-");
+  command.option("--robot", *robot, "mbbr or mip").required().one_of({"mbbr", "mip"});
+  command.option("--in", *in,
+                   "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
+                   "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}").required();
+  command.option("--json", *json, "output file, - for stdout").show_default();
+  command.action([=] {
+    write_json(map_rows(*in, models().at(*robot)), *json);
+    return 0;
+  });
+}
+
+}  // namespace equipoise::app

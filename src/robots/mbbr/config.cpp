@@ -1,0 +1,169 @@
+#include <algorithm>
+
+#include "config/common_config.hpp"
+#include "robots/mbbr/config.hpp"
+
+namespace equipoise {
+namespace {
+
+using config::Document;
+using config::read_filter;
+using config::Section;
+
+constexpr double kTwoPi = 2.0 * kPi;
+
+MbbrParameters read_robot(Section s) {
+  MbbrParameters p;
+  s.text("type");
+  p.m_t = s.number("body_mass_kg", 0.01, 20.0);
+  p.m_b = s.number("ball_mass_kg", 0.001, 10.0);
+  p.r = s.number("ball_radius_m", 0.005, 0.5);
+  p.r_w = s.number("wheel_radius_m", 0.002, 0.2);
+  p.l = s.number("com_height_m", 0.005, 2.0);
+  const Vec3 inertia = s.vector<3>("body_inertia_kg_m2", 1e-7, 10.0);
+  p.I_t1 = inertia.x();
+  p.I_t2 = inertia.y();
+  p.I_t3 = inertia.z();
+  p.I_b = s.number("ball_inertia_kg_m2", 1e-8, 1.0);
+  p.I_w = s.number("wheel_inertia_about_ball_kg_m2", 0.0, 1.0);
+  p.k1 = s.number("k1_N_m", 1e-4, 100.0);
+  p.k2_ball = s.number("k2_ball_N_m_s", 0.0, 10.0);
+  p.mu_c = s.number("coulomb_friction_N_m", 0.0, 10.0);
+  p.mu_v = s.number("viscous_friction_N_m_s", 0.0, 10.0);
+  p.l_a = s.vector<3>("imu_position_m", -1.0, 1.0);
+  p.alpha_deg = s.number("wheel_latitude_deg", 35.3, 89.0);
+  p.azimuth_deg = s.number("wheel_azimuth_deg", -180.0, 180.0);
+  s.finish();
+  return p;
+}
+
+/// Rows over yaw rate, given in Hz, strictly ascending from zero.
+template <std::size_t Columns>
+GainSchedule<Columns> read_schedule(Section& parent, const std::string& key,
+                                    const std::array<const char*, Columns>& names) {
+  GainSchedule<Columns> schedule;
+  double previous = -1.0;
+  for (Section& row : parent.tables(key, 1, 16)) {
+    const double hz = row.number("yaw_hz", 0.0, 20.0);
+    if (hz <= previous) row.fail("yaw_hz", "rows must ascend");
+    previous = hz;
+    schedule.at[schedule.rows] = hz * kTwoPi;
+    for (std::size_t c = 0; c < Columns; ++c)
+      schedule.row[schedule.rows][c] = row.number(names[c], -1e3, 1e3);
+    row.finish();
+    ++schedule.rows;
+  }
+  return schedule;
+}
+
+MbbrReferenceParams read_reference(Section s, double ball_radius_m) {
+  MbbrReferenceParams p;
+  p.slc_unit = s.number("slc_unit_rad_per_rad_s", 0.0, 1.0);
+  p.slc_sign = s.number("slc_sign", -1.0, 1.0);
+  p.rate_feedback =
+      s.choice("rate_feedback", {"body", "euler"}) == 0 ? RateFeedback::kBody : RateFeedback::kEuler;
+  p.frame = s.choice("filter_frame", {"inertial", "yaw"}) == 0 ? FilterFrame::kInertial : FilterFrame::kYaw;
+  p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
+  p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
+  p.ball_radius_m = ball_radius_m;
+  p.schedule =
+      read_schedule<MbbrReferenceParams::kColumns>(s, "schedule", {"slc_gain", "slc_pole", "low_pass_rad_s"});
+  s.finish();
+  return p;
+}
+
+MbbrThesisFeedbackParams read_thesis(Section s) {
+  MbbrThesisFeedbackParams p;
+  p.yaw_feedforward_s = s.number("yaw_feedforward_s", -1.0, 1.0);
+  p.schedule =
+      read_schedule<MbbrThesisFeedbackParams::kColumns>(s, "gains", {"c1", "c2", "c3", "c4", "c5", "c6"});
+  s.finish();
+  return p;
+}
+
+void read_disturbance(Section& s, MbbrWorldParams* w) {
+  w->coulomb_scale = s.number("coulomb_scale", 0.0, 10.0);
+  w->extra_viscous_N_m_s = s.number("extra_viscous_N_m_s", 0.0, 1.0);
+  w->yaw_friction_scale = s.vector<2>("yaw_friction_scale", 0.0, 10.0);
+  w->drive.wheel_torque_scale = s.vector<3>("wheel_torque_scale", 0.0, 2.0);
+  w->drive.gear.play_rad = s.number("backlash_rad", 0.0, 0.5);
+  w->drive.gear.rotor_inertia_kg_m2 = s.number("rotor_inertia_kg_m2", 1e-8, 1.0);
+  w->drive.roller_tilt_rad = s.number("roller_tilt_rad", 0.0, 0.5);
+  w->drive.rollers_per_turn = s.number("rollers_per_turn", 1.0, 100.0);
+  w->drive.roller_slip_N_m = s.number("roller_slip_N_m", 0.0, 1.0);
+  w->drive.wheel_grip = s.number("wheel_grip", 0.0, 5.0);
+}
+
+MbbrWorldParams read_mbbr_world(Section s, BridgeType* bridge) {
+  MbbrWorldParams w;
+  w.process_noise_sigma = s.vector<10>("process_noise_variance", 0.0, 10.0).cwiseSqrt();
+  w.common = config::read_world(s, bridge, [&w](Section& d) { read_disturbance(d, &w); });
+  return w;
+}
+
+Loaded<MbbrConfig> read_mbbr(const Document& document) {
+  Section root(document, document.root(), "");
+  Loaded<MbbrConfig> loaded;
+  MbbrConfig& c = loaded.config;
+
+  Section robot = root.table("robot");
+  config::expect_robot(robot, "mbbr");
+  c.robot = read_robot(robot);
+  c.motor = config::read_motor(root.table("motor"));
+  c.calibration = config::read_calibration(root.table("calibration"), Mbbr::kWheels);
+  Section friction = root.table("friction");
+  c.friction.coulomb_u = c.robot.mu_c / c.robot.k1;
+  c.friction.gain = friction.number("compensation", 0.0, 1.5);
+  friction.finish();
+
+  Section estimator = root.table("estimator");
+  read_filter<KalmanFilter<MbbrModel10>>(estimator.table("ekf"), c.estimators.ekf);
+  read_filter<KalmanFilter<MbbrModel13>>(estimator.table("ekf13"), c.estimators.ekf13);
+  read_filter<KalmanFilter<MbbrPublishedModel>>(estimator.table("ekf13_published"),
+                                                c.estimators.ekf13_published);
+  Section kf = estimator.table("kf_attitude");
+  c.estimators.kf_yaw_transport = kf.boolean("yaw_transport");
+  read_filter<KalmanFilter<MbbrLinearModel>>(kf, c.estimators.kf);
+  estimator.finish();
+  c.estimators.robot = c.robot;
+
+  c.reference = read_reference(root.table("reference"), c.robot.r);
+  Section controller = root.table("controller");
+  c.thesis = read_thesis(controller.table("thesis"));
+  Section scheduled = controller.table("scheduled");
+  c.scheduled.yaw_feedforward = scheduled.boolean("yaw_feedforward");
+  scheduled.finish();
+  controller.finish();
+  c.safety = config::read_safety(root.table("safety"));
+  c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
+
+  Section world = root.table("world");
+  for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
+    c.world[i] = read_mbbr_world(world.table(kFidelityNames[i]), &c.world_bridge[i]);
+  }
+  world.finish();
+  root.finish();
+  loaded.sha256 = document.sha256();
+  loaded.toml = document.canonical();
+  return loaded;
+}
+
+}  // namespace
+
+Loaded<MbbrConfig> load_mbbr(const std::string& path, const std::vector<std::string>& overrides) {
+  return read_mbbr(Document(path, overrides));
+}
+
+Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin) {
+  return read_mbbr(Document::parse(text, origin));
+}
+
+MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {
+  return {robot, calibration, estimators, reference, thesis, friction, motor, safety, attitude};
+}
+
+MbbrScheduledPipeline::Params MbbrConfig::scheduled_pipeline() const {
+  return {robot, calibration, estimators, reference, scheduled, friction, motor, safety, attitude};
+}
+
+}  // namespace equipoise

@@ -1,0 +1,46 @@
+// Everything the MBBR is configured with, read from one strict TOML file.
+// In: path, overrides -> out: typed parameters; ConfigError otherwise. Start-up only.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "equipoise/config.hpp"
+#include "equipoise/pipeline.hpp"
+#include "robots/mbbr/estimators.hpp"
+#include "robots/mbbr/reference.hpp"
+#include "robots/mbbr/scheduled_feedback.hpp"
+#include "robots/mbbr/thesis_feedback.hpp"
+#include "robots/mbbr/world.hpp"
+
+namespace equipoise {
+
+using MbbrThesisPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrThesisFeedback>;
+using MbbrScheduledPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrScheduledFeedback>;
+
+
+struct MbbrConfig {
+  MbbrParameters robot;
+  MotorParameters motor;
+  Calibration calibration;
+  FrictionCompensation friction;
+  MbbrEstimatorParams estimators;
+  MbbrReferenceParams reference;
+  MbbrThesisFeedbackParams thesis;
+  MbbrScheduledFeedbackParams scheduled;
+  SafetyParams safety;
+  AttitudeFilterParams attitude;
+  std::array<MbbrWorldParams, 3> world;      // by Fidelity
+  std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
+
+  MbbrThesisPipeline::Params thesis_pipeline() const;
+  MbbrScheduledPipeline::Params scheduled_pipeline() const;
+};
+
+
+Loaded<MbbrConfig> load_mbbr(const std::string& path, const std::vector<std::string>& overrides);
+/// From text, e.g. of a log; `origin` names it in errors.
+Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin);
+
+}  // namespace equipoise

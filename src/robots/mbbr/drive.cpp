@@ -1,0 +1,99 @@
+#include "robots/mbbr/drive.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace equipoise {
+
+Mat3 wheel_contacts(const MbbrParameters& robot) noexcept {
+  const double alpha = robot.alpha_deg * kPi / 180.0;
+  const Vec3 first(-std::sin(alpha), 0.0, std::cos(alpha));
+  Mat3 contacts;
+  for (int i = 0; i < Mbbr::kWheels; ++i) {
+    contacts.col(i) =
+        Eigen::AngleAxisd(robot.azimuth_deg * kPi / 180.0 + 2.0 * kPi / 3.0 * i, Vec3::UnitZ()) * first;
+  }
+  return contacts;
+}
+
+Vec3 roller_rows(double rollers_per_turn, const Vec3& wheel_angle_rad) noexcept {
+  Vec3 rows;
+  for (int i = 0; i < 3; ++i) rows(i) = std::sin(rollers_per_turn * wheel_angle_rad(i)) >= 0.0 ? 1.0 : -1.0;
+  return rows;
+}
+
+double grip_limit_N_m(double wheel_grip, const MbbrParameters& robot) noexcept {
+  const double load = robot.m_t * kGravity_m_s2 * normal_force_over_weight(robot.alpha_deg * kPi / 180.0);
+  return wheel_grip * load * robot.r_w;
+}
+
+Grip limit_by_grip(double torque_N_m, double limit_N_m, double motor_damping_N_m_s) noexcept {
+  const double passed = std::clamp(torque_N_m, -limit_N_m, limit_N_m);
+  return {passed, (torque_N_m - passed) / motor_damping_N_m_s};
+}
+
+MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MotorParameters& motor, const MbbrDriveParams& p)
+    : p_(p),
+      kinematics_(robot),
+      ratio_(robot.r / robot.r_w),
+      motor_damping_N_m_s_(motor.k2()),
+      grip_N_m_(grip_limit_N_m(p.wheel_grip, robot)),
+      contacts_(wheel_contacts(robot)),
+      tilted_(kinematics_.T_ob()) {}
+
+Vec3 MbbrDrive::wheel_rates(const Vec3& relative_rate_B) const noexcept {
+  if (!tilts()) return kinematics_.wheels_from_ball(relative_rate_B);
+  return ratio_ * (tilted_.transpose() * relative_rate_B);
+}
+
+/// Before grip limits them.
+Vec3 MbbrDrive::wheel_torques(const Motors& motors, const Vec3& wheel_rate) const noexcept {
+  return engaged_.cwiseProduct(p_.wheel_torque_scale).cwiseProduct(motors.torque(wheel_rate)) + ripple_N_m_;
+}
+
+void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, const Vec3& wheel_angle_rad,
+                           double step_s) noexcept {
+  if (tilts()) {
+    const Vec3 rows = roller_rows(p_.rollers_per_turn, wheel_angle_rad);
+    tilted_ = std::cos(p_.roller_tilt_rad) * kinematics_.T_ob() +
+              std::sin(p_.roller_tilt_rad) * contacts_ * rows.asDiagonal();
+  }
+  if (p_.roller_slip_N_m != 0.0) {
+    ripple_N_m_ = p_.roller_slip_N_m * (p_.rollers_per_turn * wheel_angle_rad).array().sin().matrix();
+  }
+  const Vec3 wheel_rate = wheel_rates(relative_rate_B);
+  if (p_.gear.play_rad != 0.0) {
+    Vec3 motor_rate = wheel_rate;
+    for (int i = 0; i < Mbbr::kWheels; ++i) motor_rate(i) += gears_[static_cast<std::size_t>(i)].rate_rad_s();
+    const Vec3 torque = motors.torque(motor_rate);
+    for (int i = 0; i < Mbbr::kWheels; ++i) {
+      engaged_(i) = gears_[static_cast<std::size_t>(i)].step(p_.gear, torque(i), step_s) ? 1.0 : 0.0;
+    }
+  }
+  if (p_.wheel_grip != 0.0) {
+    const Vec3 torque = wheel_torques(motors, wheel_rate);
+    for (int i = 0; i < Mbbr::kWheels; ++i) {
+      slip_rad_(i) += limit_by_grip(torque(i), grip_N_m_, motor_damping_N_m_s_).slip_rad_s * step_s;
+    }
+  }
+}
+
+Vec3 MbbrDrive::torque_B(const Motors& motors, const Vec3& relative_rate_B) const noexcept {
+  Vec3 torque = wheel_torques(motors, wheel_rates(relative_rate_B));
+  if (p_.wheel_grip != 0.0) torque = torque.cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
+  if (!tilts()) return kinematics_.axes_from_wheels(torque);
+  return ratio_ * (tilted_ * torque);
+}
+
+Vec3 MbbrDrive::seen_rate_B(const Vec3& relative_rate_B) const noexcept {
+  if (!tilts()) return relative_rate_B;
+  return kinematics_.T_ob() * (tilted_.transpose() * relative_rate_B);
+}
+
+Vec3 MbbrDrive::encoder_offset_rad() const noexcept {
+  Vec3 offset = slip_rad_;
+  for (int i = 0; i < Mbbr::kWheels; ++i) offset(i) += gears_[static_cast<std::size_t>(i)].ahead_rad();
+  return offset;
+}
+
+}  // namespace equipoise

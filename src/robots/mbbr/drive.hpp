@@ -1,0 +1,73 @@
+// The MBBR's drive as built: three uneven motors, gears with play, double-row wheels that hold the ball with
+// one row at a time and slip when overloaded. In: motors, rates at the start of a step -> out: torque on the
+// ball, and what the encoders see. With everything off: T_ob and nothing else. Source: [T] (2.1), (2.2),
+// sections 2.3.1, 5.3, 6.4; magnitudes: docs/disturbances.md. Simulation only; deterministic, no allocation.
+#pragma once
+
+#include <array>
+
+#include "equipoise/plant/gear_play.hpp"
+#include "equipoise/plant/motors.hpp"
+#include "robots/mbbr/mbbr.hpp"
+
+namespace equipoise {
+
+struct MbbrDriveParams {
+  Vec3 wheel_torque_scale = Vec3::Ones();  // torque of each motor over nominal
+  GearPlayParams gear;
+  double roller_tilt_rad = 0.0;    // of a wheel's torque axis, towards either row; (2.1)
+  double rollers_per_turn = 12.0;  // of each row
+  double roller_slip_N_m = 0.0;    // micro-slip: torque ripple of a wheel as rollers pass
+  double wheel_grip = 0.0;         // friction coefficient at the ball; 0: wheels never slip
+};
+
+/// Contact normals of the wheels, columns, body axes.
+Mat3 wheel_contacts(const MbbrParameters& robot) noexcept;
+
+/// Which row of each wheel carries it: +1 or -1.
+Vec3 roller_rows(double rollers_per_turn, const Vec3& wheel_angle_rad) noexcept;
+
+/// Torque that grip lets a wheel pass on, and how much faster the motor then turns.
+struct Grip {
+  double torque_N_m = 0.0;
+  double slip_rad_s = 0.0;
+};
+Grip limit_by_grip(double torque_N_m, double limit_N_m, double motor_damping_N_m_s) noexcept;
+double grip_limit_N_m(double wheel_grip, const MbbrParameters& robot) noexcept;
+
+class MbbrDrive {
+ public:
+  using Motors = SimulatedMotors<Mbbr::kWheels>;
+
+  MbbrDrive(const MbbrParameters& robot, const MotorParameters& motor, const MbbrDriveParams& p);
+
+  /// Rows, gears and slip are held over a step.
+  void begin_step(const Motors& motors, const Vec3& relative_rate_B, const Vec3& wheel_angle_rad,
+                  double step_s) noexcept;
+
+  /// Torque of the motors on the ball, body axes.
+  Vec3 torque_B(const Motors& motors, const Vec3& relative_rate_B) const noexcept;
+  /// Rate of the ball as the wheels' nominal axes report it.
+  Vec3 seen_rate_B(const Vec3& relative_rate_B) const noexcept;
+  /// What play and slip add to the motors' angles.
+  Vec3 encoder_offset_rad() const noexcept;
+
+ private:
+  bool tilts() const noexcept { return p_.roller_tilt_rad != 0.0; }
+  Vec3 wheel_rates(const Vec3& relative_rate_B) const noexcept;
+  Vec3 wheel_torques(const Motors& motors, const Vec3& wheel_rate) const noexcept;
+
+  MbbrDriveParams p_;
+  MbbrKinematics kinematics_;
+  double ratio_;
+  double motor_damping_N_m_s_;
+  double grip_N_m_;
+  Mat3 contacts_;  // normals, columns
+  Mat3 tilted_;    // axes of the rows that carry now, columns
+  Vec3 engaged_ = Vec3::Ones();
+  Vec3 ripple_N_m_ = Vec3::Zero();
+  Vec3 slip_rad_ = Vec3::Zero();
+  std::array<GearPlay, Mbbr::kWheels> gears_;
+};
+
+}  // namespace equipoise

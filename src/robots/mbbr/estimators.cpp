@@ -1,0 +1,128 @@
+#include "robots/mbbr/estimators.hpp"
+
+namespace equipoise {
+namespace {
+
+template <class Filter, std::size_t M>
+void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
+          const std::array<bool, M>& use) noexcept {
+  filter.predict(u);
+  filter.update(u, y, use);
+}
+
+double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * kPi); }
+
+}  // namespace
+
+MbbrEstimators::MbbrEstimators(const Params& params)
+    : params_(params),
+      kinematics_(params.robot),
+      ekf_(MbbrModel10(params.robot), params.ekf),
+      ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
+      ekf13_(MbbrModel13(params.robot), params.ekf13),
+      kf_(MbbrLinearModel(params.robot, params.kf_yaw_transport), params.kf) {}
+
+void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
+  const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);
+  const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
+
+  Vec<10> x10 = Vec<10>::Zero();
+  x10.head<2>() = tilt;
+  x10.segment<3>(MbbrModel10::kE) = phi_B + Vec3(tilt.x(), tilt.y(), 0.0);
+  ekf_.reset(x10);
+
+  Vec<13> x13 = Vec<13>::Zero();
+  x13.head<2>() = tilt;
+  x13.segment<3>(MbbrPublishedModel::kSlipX) = phi_B + Vec3(tilt.x(), tilt.y(), 0.0);
+  ekf13_.reset(x13);
+  ekf13_published_.reset(x13);
+
+  Vec<8> x8 = Vec<8>::Zero();
+  x8.head<2>() = tilt;
+  x8.segment<2>(2) = phi_B.head<2>() + tilt;
+  kf_.reset(x8);
+
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (i == index(Id::kTruth)) continue;
+    estimates_[i] = MbbrEstimate{};
+    estimates_[i].theta_xy = tilt;
+    estimates_[i].omega_B = z.gyro_B_rad_s;
+  }
+  attitude_heading_ = z.attitude_rad.z();
+}
+
+/// Heading and inertial ball angles, [T] (6.3)-(6.4).
+void MbbrEstimators::integrate(Id id, double heading_rate) noexcept {
+  MbbrEstimate& x = estimates_[index(id)];
+  x.phi += kTickS * rotate(x.theta_z, x.phi_dot_star);
+  x.theta_z += kTickS * heading_rate;
+}
+
+const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept {
+  if (held) {
+    start(z);
+    return estimates_[index(params_.active)];
+  }
+  const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
+  Vec<8> y;
+  y << z.gyro_B_rad_s, phi_B, z.accel_B_m_s2.head<2>();
+  const bool i = z.imu_ok;
+  const bool e = z.encoders_ok;
+  const std::array<bool, 8> use{i, i, i, e, e, e, i, i};
+
+  if (runs(Id::kEkf)) {
+    step(ekf_, u, y, use);
+    const Vec<10>& x = ekf_.x();
+    MbbrEstimate& out = estimates_[index(Id::kEkf)];
+    integrate(Id::kEkf, x(MbbrModel10::kThetaDotZ));
+    out.theta_xy = x.head<2>();
+    out.theta_dot = x.segment<3>(MbbrModel10::kThetaDotX);
+    out.phi_dot_star = x.tail<2>();
+    out.omega_B = body_rates(out.theta_xy, out.theta_dot);
+    out.normalized_innovation = ekf_.normalized_innovation();
+  }
+
+  const auto from_13 = [this](Id id, const Vec<13>& x, double nis) {
+    MbbrEstimate& out = estimates_[index(id)];
+    integrate(id, 0.0);
+    out.theta_xy = x.head<2>();
+    out.theta_z = x(MbbrPublishedModel::kThetaZ);
+    out.theta_dot = x.segment<3>(MbbrPublishedModel::kThetaDotX);
+    out.phi_dot_star = x.segment<2>(MbbrPublishedModel::kPhiDotX);
+    out.omega_B = body_rates(out.theta_xy, out.theta_dot);
+    out.normalized_innovation = nis;
+  };
+  if (runs(Id::kEkf13Published)) {
+    step(ekf13_published_, u, y, use);
+    from_13(Id::kEkf13Published, ekf13_published_.x(), ekf13_published_.normalized_innovation());
+  }
+  if (runs(Id::kEkf13)) {
+    step(ekf13_, u, y, use);
+    from_13(Id::kEkf13, ekf13_.x(), ekf13_.normalized_innovation());
+  }
+
+  if (runs(
+          Id::kKfAttitude)) {  // [T] section 6.4.6: attitude from its source, the rest from the linear filter
+    Vec<6> y6;
+    y6 << z.gyro_B_rad_s.head<2>(), phi_B.head<2>(), z.accel_B_m_s2.head<2>();
+    step(kf_, Vec3(u.x(), u.y(), z.gyro_B_rad_s.z()), y6, std::array<bool, 6>{i, i, e, e, i, i});
+    const Vec<8>& x = kf_.x();
+    MbbrEstimate& out = estimates_[index(Id::kKfAttitude)];
+    if (z.attitude_ok) {
+      integrate(Id::kKfAttitude, wrapped(z.attitude_rad.z() - attitude_heading_) / kTickS);
+      out.theta_xy = z.attitude_rad.head<2>();
+      attitude_heading_ = z.attitude_rad.z();
+    } else {  // hold the tilt, carry the heading with the gyro
+      integrate(Id::kKfAttitude, z.gyro_B_rad_s.z());
+      attitude_heading_ += kTickS * z.gyro_B_rad_s.z();
+    }
+    out.omega_B << x.segment<2>(4),
+        z.gyro_B_rad_s.z();  // the filter's theta' is a smoothed gyro: a body rate
+    out.theta_dot = euler_rates(out.theta_xy, out.omega_B);
+    out.phi_dot_star = x.tail<2>();
+    out.normalized_innovation = kf_.normalized_innovation();
+  }
+  return estimates_[index(params_.active)];
+}
+
+}  // namespace equipoise

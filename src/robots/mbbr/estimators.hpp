@@ -1,0 +1,69 @@
+// The MBBR's estimators, side by side on the same samples.
+// In: Measurement, the input applied since the last one -> out: MbbrEstimate per estimator. Each integrates
+// the inertial ball angles from its own rates, [T] (6.3)-(6.4); the drift is reported, not hidden. While the
+// robot is held (motors off) the tilt comes from the averaged accelerometer and the filters are kept at rest.
+// RT-safe.
+#pragma once
+
+#include <array>
+
+#include "equipoise/estimate/kalman.hpp"
+#include "robots/mbbr/high_yaw.hpp"
+#include "robots/mbbr/published.hpp"
+#include "equipoise/estimate/rest_tilt.hpp"
+#include "robots/mbbr/mbbr.hpp"
+
+namespace equipoise {
+
+enum class MbbrEstimatorId : int { kEkf, kEkf13Published, kEkf13, kKfAttitude, kTruth };
+inline constexpr std::array<const char*, 5> kMbbrEstimatorNames{"ekf", "ekf13_published", "ekf13",
+                                                                "kf_attitude", "truth"};
+
+struct MbbrEstimatorParams {
+  MbbrEstimatorId active = MbbrEstimatorId::kEkf;
+  bool compare = false;  // run all of them, not only the active one
+  KalmanFilter<MbbrModel10>::Params ekf;
+  KalmanFilter<MbbrPublishedModel>::Params ekf13_published;
+  KalmanFilter<MbbrModel13>::Params ekf13;
+  KalmanFilter<MbbrLinearModel>::Params kf;
+  bool kf_yaw_transport = true;  // false: as in [T]
+  MbbrParameters robot;
+};
+
+/// Runs the active estimator, or all of them.
+class MbbrEstimators {
+ public:
+  using Id = MbbrEstimatorId;
+  using Params = MbbrEstimatorParams;
+  static constexpr std::size_t kCount = kMbbrEstimatorNames.size();
+  static constexpr const auto& kNames = kMbbrEstimatorNames;
+
+  explicit MbbrEstimators(const Params& params);
+
+  /// Simulation only: what `truth` returns from now on.
+  void observe_truth(const MbbrEstimate& truth) noexcept { estimates_[index(Id::kTruth)] = truth; }
+
+  /// `held`: motors off, the robot is not balancing.
+  const MbbrEstimate& update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept;
+
+  bool runs(Id id) const noexcept { return id == params_.active || params_.compare; }
+  const MbbrEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
+  bool needs_attitude() const noexcept { return params_.active == Id::kKfAttitude; }
+
+ private:
+  static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
+  void start(const Mbbr::Sample& z) noexcept;
+  void integrate(Id id, double heading_rate) noexcept;
+
+  Params params_;
+  MbbrKinematics kinematics_;
+  KalmanFilter<MbbrModel10> ekf_;
+  KalmanFilter<MbbrPublishedModel> ekf13_published_;
+  KalmanFilter<MbbrModel13> ekf13_;
+  KalmanFilter<MbbrLinearModel> kf_;
+  RestTilt rest_tilt_;
+  std::array<MbbrEstimate, kCount> estimates_{};
+  double attitude_heading_ = 0.0;  // continuous heading of the attitude source
+};
+
+}  // namespace equipoise

@@ -1,0 +1,69 @@
+// The MBBR's simulated world: exact rolling dynamics in RK4, three motors behind their bridges, friction,
+// sensors. In: motor command per tick -> out: raw samples, and the truth. A hand holds the body until the
+// motors are first enabled. Coulomb friction is a torque held over each step: the one that stops the axis, at
+// most mu_c. Simulation only; allocates nothing after construction; same seed, same bytes.
+#pragma once
+
+#include "robots/mbbr/drive.hpp"
+#include "robots/mbbr/dynamics.hpp"
+#include "equipoise/plant/sensors.hpp"
+
+namespace equipoise {
+
+struct MbbrWorldParams {
+  WorldParams common;
+  MbbrDriveParams drive;
+  double coulomb_scale = 1.0;        // of the identified friction
+  double extra_viscous_N_m_s = 0.0;  // support balls, rollers
+  Vec2 yaw_friction_scale{1.0,
+                          1.0};  // Coulomb about z for positive and negative spin of the ball in the body
+  Vec<10> process_noise_sigma = Vec<10>::Zero();  // per tick: theta x y z, phi x y, and their rates
+};
+
+/// Largest friction torque about each body axis at these relative rates.
+Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept;
+
+class MbbrWorld {
+ public:
+  MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor, const Calibration& calibration,
+            const MbbrWorldParams& world);
+
+  /// Advances one tick with the bridges as commanded.
+  void advance(const MotorCommand& command);
+
+  /// What the devices report now.
+  RawSample sense();
+
+  MbbrEstimate truth() const noexcept;
+  double time_s() const noexcept { return time_s_; }
+  bool held() const noexcept { return held_; }
+  double battery_V() const noexcept { return motors_.battery_V(); }
+
+ private:
+  /// Attitude, body rates, ball rates, ball angles (inertial), relative ball angle; 3 + 3 + 2 + 2 + 3.
+  using State = Vec<13>;
+  static MbbrMotion motion(const State& s) noexcept;
+  MbbrAccelerations accelerations(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
+  State derivative(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
+  Vec3 coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept;
+  Vec3 viscous_torque_B(const Vec3& relative_rate_B) const noexcept;
+  Vec2 slope_pull_star(double theta_z) const noexcept;
+  Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
+  void step(double h) noexcept;
+  void disturb();
+
+  MbbrParameters robot_;
+  MbbrWorldParams world_;
+  MbbrKinematics kinematics_;
+  MbbrDynamics dynamics_;
+  Vec3 mobility_;
+  MbbrDrive::Motors motors_;
+  MbbrDrive drive_;
+  NoiseStream start_noise_, process_noise_;
+  State s_;
+  SimulatedSensors sensors_;
+  double time_s_ = 0.0;
+  bool held_ = true;
+};
+
+}  // namespace equipoise

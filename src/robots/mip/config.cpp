@@ -1,0 +1,142 @@
+#include "config/common_config.hpp"
+#include "robots/mip/config.hpp"
+
+namespace equipoise {
+namespace {
+
+using config::Document;
+using config::read_filter;
+using config::Section;
+
+MipParameters read_robot(Section s) {
+  MipParameters p;
+  p.m_b = s.number("body_mass_kg", 0.01, 20.0);
+  p.m_w = s.number("wheel_mass_kg", 0.001, 10.0);
+  p.r = s.number("wheel_radius_m", 0.005, 0.5);
+  p.d = s.number("track_m", 0.01, 2.0);
+  p.l = s.number("com_height_m", 0.005, 2.0);
+  const Vec3 body = s.vector<3>("body_inertia_kg_m2", 1e-7, 10.0);
+  p.I_b1 = body.x();
+  p.I_b2 = body.y();
+  p.I_b3 = body.z();
+  const Vec3 wheel = s.vector<3>("wheel_inertia_kg_m2", 1e-8, 1.0);
+  p.I_w1 = wheel.x();
+  p.I_w2 = wheel.y();
+  p.I_w3 = wheel.z();
+  p.k1 = s.number("k1_N_m", 1e-4, 100.0);
+  p.k2 = s.number("k2_N_m_s", 0.0, 10.0);
+  p.mu_c = s.number("coulomb_friction_N_m", 0.0, 10.0);
+  p.mu_v = s.number("viscous_friction_N_m_s", 0.0, 10.0);
+  p.l_a = s.vector<3>("imu_position_m", -1.0, 1.0);
+  s.finish();
+  return p;
+}
+
+MipEstimatorParams read_estimators(Section s, const MipParameters& robot) {
+  MipEstimatorParams p;
+  p.robot = robot;
+  p.heading_time_constant_s = s.number("heading_time_constant_s", kTickS, 1000.0);
+  Section complementary = s.table("complementary");
+  p.complementary_weight = complementary.number("weight", 0.0, 1.0);
+  complementary.finish();
+  read_filter<KalmanFilter<MipInclinometerModel>>(s.table("complementary_kf"), p.complementary_kf);
+  read_filter<KalmanFilter<MipPlanarModel>>(s.table("planar_kf"), p.planar_kf);
+  Section ekf = s.table("ekf");
+  p.ekf_options.estimate_gyro_bias = ekf.boolean("estimate_gyro_bias");
+  p.ekf_options.know_lever_arm = ekf.boolean("know_lever_arm");
+  p.ekf_options.estimate_lever_arm = ekf.boolean("estimate_lever_arm");
+  read_filter<KalmanFilter<MipHighYawModel>>(ekf, p.ekf);
+  read_filter<KalmanFilter<MipPublishedModel>>(s.table("ekf_published"), p.ekf_published);
+  s.finish();
+  return p;
+}
+
+MipReferenceParams read_reference(Section s, double wheel_radius_m) {
+  MipReferenceParams p;
+  p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
+  p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
+  p.max_phi_error_rad = s.number("max_phi_error_rad", 0.01, 1000.0);
+  p.wheel_radius_m = wheel_radius_m;
+  s.finish();
+  return p;
+}
+
+/// What both controllers limit.
+template <class Params>
+void read_limits(Section& s, Params& p) {
+  p.max_lean_rad = s.number("max_lean_rad", 0.01, 1.0);
+  p.max_u = s.number("max_u", 0.1, 10.0);
+  p.soft_start_s = s.number("soft_start_s", 0.0, 5.0);
+}
+
+MipWorldParams read_mip_world(Section s, BridgeType* bridge) {
+  MipWorldParams w;
+  w.process_noise_sigma = s.vector<6>("process_noise_variance", 0.0, 10.0).cwiseSqrt();
+  w.drivetrain.motor_gain = s.vector<2>("motor_gain", 0.1, 10.0);
+  w.drivetrain.friction_gain = s.vector<2>("friction_gain", 0.0, 10.0);
+  w.drivetrain.gear.play_rad = s.number("backlash_rad", 0.0, 0.5);
+  w.drivetrain.gear.rotor_inertia_kg_m2 = s.number("rotor_inertia_kg_m2", 1e-7, 1.0);
+  w.lift_at_s = s.number("lift_at_s", -1.0, 1e6);
+  w.common = config::read_world(s, bridge);
+  return w;
+}
+
+Loaded<MipConfig> read_mip(const Document& document) {
+  Section root(document, document.root(), "");
+  Loaded<MipConfig> loaded;
+  MipConfig& c = loaded.config;
+
+  Section robot = root.table("robot");
+  config::expect_robot(robot, "mip");
+  c.robot = read_robot(robot);
+  c.motor = config::read_motor(root.table("motor"));
+  c.calibration = config::read_calibration(root.table("calibration"), Mip::kWheels);
+  Section friction = root.table("friction");
+  c.friction.coulomb_u = c.robot.mu_c / c.robot.k1;
+  c.friction.gain = friction.number("compensation", 0.0, 1.5);
+  friction.finish();
+  c.estimators = read_estimators(root.table("estimator"), c.robot);
+  c.reference = read_reference(root.table("reference"), c.robot.r);
+
+  Section controller = root.table("controller");
+  Section slc = controller.table("slc");
+  c.slc.published = slc.boolean("published");
+  read_limits(slc, c.slc);
+  slc.finish();
+  Section lqr = controller.table("lqr");
+  read_limits(lqr, c.lqr);
+  lqr.finish();
+  controller.finish();
+  c.safety = config::read_safety(root.table("safety"));
+  c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
+
+  Section world = root.table("world");
+  for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
+    c.world[i] = read_mip_world(world.table(kFidelityNames[i]), &c.world_bridge[i]);
+  }
+  world.finish();
+  root.finish();
+  loaded.sha256 = document.sha256();
+  loaded.toml = document.canonical();
+  return loaded;
+}
+
+}  // namespace
+
+Loaded<MipConfig> load_mip(const std::string& path, const std::vector<std::string>& overrides) {
+  return read_mip(Document(path, overrides));
+}
+
+Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin) {
+  return read_mip(Document::parse(text, origin));
+}
+
+MipSlcPipeline::Params MipConfig::slc_pipeline() const {
+  return {robot, calibration, estimators, reference, slc, friction, motor, safety, attitude};
+}
+
+MipLqrPipeline::Params MipConfig::lqr_pipeline() const {
+  return {robot, calibration, estimators, reference, lqr, friction, motor, safety, attitude};
+}
+
+}  // namespace equipoise

@@ -1,0 +1,46 @@
+// Everything the eduMIP is configured with, read from one strict TOML file.
+// In: path, overrides -> out: typed parameters; ConfigError otherwise. Start-up only.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "equipoise/config.hpp"
+#include "equipoise/pipeline.hpp"
+#include "robots/mip/estimators.hpp"
+#include "robots/mip/lqr_feedback.hpp"
+#include "robots/mip/reference.hpp"
+#include "robots/mip/slc_feedback.hpp"
+#include "robots/mip/world.hpp"
+
+namespace equipoise {
+
+using MipSlcPipeline = Pipeline<Mip, MipEstimators, MipReferenceStage, MipSlcFeedback>;
+using MipLqrPipeline = Pipeline<Mip, MipEstimators, MipReferenceStage, MipLqrFeedback>;
+
+
+struct MipConfig {
+  MipParameters robot;
+  MotorParameters motor;
+  Calibration calibration;
+  FrictionCompensation friction;
+  MipEstimatorParams estimators;
+  MipReferenceParams reference;
+  MipSlcParams slc;
+  MipLqrParams lqr;
+  SafetyParams safety;
+  AttitudeFilterParams attitude;
+  std::array<MipWorldParams, 3> world;       // by Fidelity
+  std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
+
+  MipSlcPipeline::Params slc_pipeline() const;
+  MipLqrPipeline::Params lqr_pipeline() const;
+};
+
+
+Loaded<MipConfig> load_mip(const std::string& path, const std::vector<std::string>& overrides);
+/// From text, e.g. of a log; `origin` names it in errors.
+Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin);
+
+}  // namespace equipoise

@@ -1,0 +1,181 @@
+#include "robots/mip/world.hpp"
+
+#include "equipoise/plant/coulomb.hpp"
+
+namespace equipoise {
+namespace {
+
+enum At : int { kTheta, kPhi, kPsi, kThetaDot, kPhiDot, kPsiDot, kPosition };
+
+// A hand that lifts the robot tips it slowly, our estimate.
+constexpr double kHandRate_rad_s = 0.1;
+constexpr double kHeldTilt_rad = 0.3;
+
+Vec<8> start_state(NoiseStream& noise, double sigma) {
+  Vec<8> s = Vec<8>::Zero();
+  s(kTheta) = noise.gaussian(sigma);
+  s(kPsi) = noise.gaussian(sigma);
+  return s;
+}
+
+}  // namespace
+
+MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
+                   const MipWorldParams& world)
+    : robot_(robot),
+      world_(world),
+      kinematics_(robot),
+      dynamics_(robot),
+      motors_(motor, calibration, world.common),
+      start_noise_(world.common.seed, kStartNoise),
+      process_noise_(world.common.seed, kProcessNoise),
+      s_(start_state(start_noise_, world.common.initial_tilt_rad)),
+      sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s_(kTheta), 0.0, s_(kPsi))) {
+  for (int i = 0; i < 2; ++i) {  // upright at rest
+    const Vec2 unit = Vec2::Unit(i);
+    const Vec3 a = dynamics_.accelerations(MipMotion{}, unit.sum(), unit.x() - unit.y());
+    mobility_.col(i) = kinematics_.wheels(a(1), a(2));
+  }
+}
+
+MipMotion MipWorld::motion(const State& s) noexcept {
+  return {s(kTheta), s(kThetaDot), s(kPhiDot), s(kPsiDot)};
+}
+
+Vec2 MipWorld::wheel_rates(const State& s) const noexcept {
+  return kinematics_.wheels(s(kPhiDot), s(kPsiDot));
+}
+
+/// Motor and viscous friction, as far as the teeth touch.
+Vec2 MipWorld::gear_torque(const State& s) const noexcept {
+  const Vec2 rate = wheel_rates(s);
+  Vec2 tau = motors_.torque(rate).cwiseProduct(world_.drivetrain.motor_gain);
+  if (world_.common.friction) tau -= robot_.mu_v * rate;
+  return tau.cwiseProduct(engaged_);
+}
+
+Vec3 MipWorld::accelerations(const State& s, const Vec2& wheel_torque) const noexcept {
+  if (lifted()) {  // the body is in a hand, the wheels are in the air
+    const Vec2 wheel = wheel_torque / robot_.I_w1;
+    return {0.0, kinematics_.phi(wheel), 0.0};
+  }
+  Vec3 a = dynamics_.accelerations(motion(s), wheel_torque.sum(), wheel_torque.x() - wheel_torque.y());
+  const Vec2 push_W = push_force_W(world_.common, time_s_);
+  const Vec2& slope = world_.common.floor_slope_rad;
+  if (!push_W.isZero(0.0) || !slope.isZero(0.0)) {
+    // Force along the rolling direction at the centre of mass: power F (r (phi' + theta') + l cos theta'),
+    // with the axle's speed along -y. On a slope the whole weight pulls the axle downhill.
+    const Vec2 weight_W = -(robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2 * slope;
+    const double forward = -rotate(-s(kPsi), push_W).y();
+    const double downhill = -rotate(-s(kPsi), weight_W).y();
+    const double c = std::cos(s(kTheta));
+    const double lm = robot_.l * robot_.m_b;
+    const double m22 = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;
+    const double m12 = m22 + lm * robot_.r * c;
+    const double m11 = robot_.I_b1 + robot_.l * lm + 2.0 * lm * robot_.r * c + m22;
+    const double det = m11 * m22 - m12 * m12;
+    const double f1 = forward * (robot_.r + robot_.l * c) + downhill * robot_.r;
+    const double f2 = (forward + downhill) * robot_.r;
+    a(0) += (m22 * f1 - m12 * f2) / det;
+    a(1) += (m11 * f2 - m12 * f1) / det;
+  }
+  return a;
+}
+
+MipWorld::State MipWorld::derivative(const State& s, const Vec2& friction) const noexcept {
+  State d;
+  d.segment<3>(kTheta) = s.segment<3>(kThetaDot);
+  d.segment<3>(kThetaDot) = accelerations(s, gear_torque(s) + friction);
+  const double speed = lifted() ? 0.0 : -robot_.r * (s(kPhiDot) + s(kThetaDot));
+  d.segment<2>(kPosition) = rotate(s(kPsi), Vec2(0.0, speed));
+  return d;
+}
+
+Vec2 MipWorld::friction_torque(const State& s) const noexcept {
+  if (!world_.common.friction) return Vec2::Zero();
+  const double h = world_.common.step_s;
+  const State next = s + h * derivative(s, Vec2::Zero());
+  const Vec2 now = wheel_rates(s);
+  const Stiction& stiction = world_.common.stiction;
+  Vec2 limit = robot_.mu_c * world_.drivetrain.friction_gain;
+  limit = limit.cwiseProduct(Vec2(stiction.factor(now.x()), stiction.factor(now.y())));
+  return coulomb_torque<2>(wheel_rates(next), mobility_, h, limit);
+}
+
+/// The motor's side of each gear over one step.
+void MipWorld::cross_backlash() noexcept {
+  const GearPlayParams& gear = world_.drivetrain.gear;
+  if (gear.play_rad == 0.0) return;
+  const Vec2 rate(gears_[0].rate_rad_s(), gears_[1].rate_rad_s());
+  const Vec2 motor = motors_.torque(wheel_rates(s_) + rate);
+  for (int i = 0; i < 2; ++i) {
+    const bool touch = gears_[static_cast<std::size_t>(i)].step(gear, motor(i), world_.common.step_s);
+    engaged_(i) = touch ? 1.0 : 0.0;
+  }
+}
+
+void MipWorld::disturb() {
+  if (world_.process_noise_sigma.isZero(0.0)) return;
+  for (int i = 0; i < 6; ++i) s_(i) += process_noise_.gaussian(world_.process_noise_sigma(i));
+}
+
+void MipWorld::advance(const MotorCommand& command) {
+  if (command.enable) held_ = false;
+  const int steps = static_cast<int>(std::lround(kTickS / world_.common.step_s));
+  for (int i = 0; i < steps && !held_; ++i) {
+    const double h = world_.common.step_s;
+    if (i == world_.common.actuation_latency_steps) motors_.command(command);
+    if (lifted()) {
+      s_(kThetaDot) = s_(kTheta) < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
+      s_(kPsiDot) = 0.0;
+    }
+    cross_backlash();
+    const Vec2 friction = friction_torque(s_);
+    const State k1 = derivative(s_, friction);
+    const State k2 = derivative(s_ + 0.5 * h * k1, friction);
+    const State k3 = derivative(s_ + 0.5 * h * k2, friction);
+    const State k4 = derivative(s_ + h * k3, friction);
+    s_ += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    time_s_ += h;
+  }
+  if (held_) {
+    time_s_ += kTickS;
+  } else {
+    disturb();
+  }
+  motors_.update_battery(wheel_rates(s_));
+}
+
+RawSample MipWorld::sense() {
+  TrueMotion m;
+  m.time_s = time_s_;
+  m.theta_rad << s_(kTheta), 0.0, s_(kPsi);
+  const double sin = std::sin(s_(kTheta));
+  const double cos = std::cos(s_(kTheta));
+  m.omega_B_rad_s << s_(kThetaDot), sin * s_(kPsiDot), cos * s_(kPsiDot);
+  if (held_ || lifted()) {
+    m.specific_force_B_m_s2 << 0.0, sin * kGravity_m_s2, cos * kGravity_m_s2;
+  } else {
+    const Vec3 a = accelerations(s_, gear_torque(s_) + friction_torque(s_));
+    const Vec3 from_com = robot_.l_a - Vec3(0.0, 0.0, robot_.l);
+    m.specific_force_B_m_s2 = -dynamics_.accelerometer_B(motion(s_), a, from_com);
+  }
+  const Vec2 wheels = kinematics_.wheels(s_(kPhi), s_(kPsi));
+  m.wheel_angle_rad = {wheels.x() + gears_[0].ahead_rad(), wheels.y() + gears_[1].ahead_rad()};
+  m.battery_V = motors_.battery_V();
+  return sensors_.sense(m);
+}
+
+MipEstimate MipWorld::truth() const noexcept {
+  MipEstimate x;
+  x.theta = s_(kTheta);
+  x.phi = s_(kPhi);
+  x.psi = s_(kPsi);
+  x.theta_dot = s_(kThetaDot);
+  x.phi_dot = s_(kPhiDot);
+  x.psi_dot = s_(kPsiDot);
+  x.position_W_m = s_.segment<2>(kPosition);
+  return x;
+}
+
+}  // namespace equipoise
