@@ -24,7 +24,7 @@ struct TickResult {
   typename Reference::Reference ref;
   Vec<Robot::kInputs> u_lin = Vec<Robot::kInputs>::Zero();       // of a linear, frictionless drive
   Vec<Robot::kInputs> u_friction = Vec<Robot::kInputs>::Zero();  // with friction compensation
-  MotorCommand motors;
+  MotorCommand motors{};
   bool saturated = false;
   ArmState arm_state = ArmState::kDisarmed;
   std::uint32_t reasons = 0;  // SafetyReason bits
@@ -104,7 +104,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   MotorCommand invert_bridges(Result& t) const noexcept {
     const double supply = bridge_.supply_V(t.z.battery_V, t.z.battery_ok);
     const Wheels u = kinematics_.wheels_from_axes(t.u_friction);
-    MotorCommand motors;
+    MotorCommand motors{};
     for (int i = 0; i < Robot::kWheels; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const double duty = bridge_.invert(u(i), t.z.wheel_rate_rad_s(i), supply);
@@ -186,7 +186,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   static bool finite(const RawSample& raw) noexcept {
     const auto all = [](const auto& values) {
-      return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+      return std::all_of(std::begin(values), std::end(values), [](double v) { return std::isfinite(v); });
     };
     return all(raw.gyro_counts) && all(raw.accel_counts) && all(raw.encoder_counts) &&
            all(raw.attitude_wxyz) && std::isfinite(raw.battery_counts);

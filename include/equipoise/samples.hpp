@@ -6,26 +6,22 @@
 #include <array>
 #include <cstdint>
 
+#include "equipoise/sample.h"
 #include "equipoise/types.hpp"
 
 namespace equipoise {
 
-inline constexpr int kMaxMotors = 4;
+inline constexpr int kMaxMotors = RIO_MAX_MOTORS;
 
-/// One sample in device counts: the hardware boundary's sensors (drivers/robot_io.h), field by field.
-struct RawSample {
-  std::int64_t t_ns = 0;                            // CLOCK_MONOTONIC at the IMU's data-ready edge
-  std::array<double, 3> gyro_counts{};              // sensor axes
-  std::array<double, 3> accel_counts{};             // sensor axes, specific force
-  std::array<double, kMaxMotors> encoder_counts{};  // unwrapped, motor order
-  double battery_counts = 0.0;                      // ADC counts
-  std::array<double, 4> attitude_wxyz{1, 0, 0, 0};  // R_WS of the attitude source (DMP)
-  bool imu_ok = false;
-  bool encoders_ok = false;
-  bool battery_ok = false;
-  bool attitude_ok = false;  // a new packet since the last sample
-  std::uint32_t health = 0;  // bits of enum rio_health, recorded only
-};
+/// One sample in device counts, straight from the hardware boundary (sample.h).
+using RawSample = rio_sensors_t;
+inline bool imu_ok(const RawSample& raw) noexcept { return (raw.valid & RIO_IMU) != 0; }
+inline bool encoders_ok(const RawSample& raw) noexcept { return (raw.valid & RIO_ENCODERS) != 0; }
+inline bool battery_ok(const RawSample& raw) noexcept { return (raw.valid & RIO_BATTERY) != 0; }
+inline bool attitude_ok(const RawSample& raw) noexcept { return (raw.valid & RIO_ATTITUDE) != 0; }
+
+/// What the bridges get.
+using MotorCommand = rio_motors_t;
 
 /// The same sample in SI units and body axes. `Wheels`: the robot's motor count.
 template <int Wheels>
@@ -50,12 +46,6 @@ struct Command {
   bool arm = false;
   bool heading_reset = false;
   double age_s = 0.0;  // since somebody last asked for it
-};
-
-/// What the bridges get.
-struct MotorCommand {
-  std::array<double, kMaxMotors> duty{};  // -1 .. 1, motor order
-  bool enable = false;                    // false: bridges asleep, motors coast
 };
 
 /// Robot-neutral view of an estimate, a reference or the truth, for telemetry, metrics and safety.

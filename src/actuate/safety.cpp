@@ -21,7 +21,7 @@ int count(int n, bool ok) noexcept { return ok ? 0 : std::min(n + 1, 1 << 20); }
 int ticks(double seconds) noexcept { return static_cast<int>(seconds * kTickHz); }
 
 bool finite_and_bounded(const MotorCommand& command) noexcept {
-  return std::all_of(command.duty.begin(), command.duty.end(),
+  return std::all_of(std::begin(command.duty), std::end(command.duty),
                      [](double d) { return std::isfinite(d) && std::abs(d) <= 1.0; });
 }
 

@@ -12,7 +12,6 @@
 #include "equipoise/sense/attitude_filter.hpp"
 #include "equipoise/sense/calibrate.hpp"
 
-
 namespace equipoise::config {
 
 /// ConfigError unless the file is for this robot.

@@ -82,7 +82,7 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
   const Vec3 accel_S = (calibration_.R_BS.transpose() * (accel + calibration_.accel_bias_B_m_s2))
                            .cwiseQuotient(calibration_.accel_scale_S);
 
-  RawSample raw;
+  RawSample raw{};
   raw.t_ns = static_cast<std::int64_t>(std::llround(m.time_s * 1e9));
   for (int i = 0; i < 3; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -99,8 +99,11 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
   const Vec3 attitude = attitude_history_[(attitude_head_ + kAttitudeDelay - delay) % kAttitudeDelay];
   const Mat3 R_WB = rotation(quaternion_of(attitude));  // as the chip believes itself to be mounted
   const Eigen::Quaterniond q((misaligned_ ? Mat3(R_WB * R_misaligned_) : R_WB) * calibration_.R_BS);
-  raw.attitude_wxyz = {q.w(), q.x(), q.y(), q.z()};
-  raw.imu_ok = raw.encoders_ok = raw.battery_ok = raw.attitude_ok = true;
+  raw.attitude_wxyz[0] = q.w();
+  raw.attitude_wxyz[1] = q.x();
+  raw.attitude_wxyz[2] = q.y();
+  raw.attitude_wxyz[3] = q.z();
+  raw.valid = RIO_IMU | RIO_ENCODERS | RIO_BATTERY | RIO_ATTITUDE;
   return raw;
 }
 

@@ -16,7 +16,7 @@ StandWorld::StandWorld(const StandParams& stand, const MotorParameters& motor, c
       sensors_(calibration, world, stand.wheels, start_noise_, Vec3::Zero()) {}
 
 void StandWorld::advance(const MotorCommand& command) {
-  MotorCommand wired;
+  MotorCommand wired{};
   wired.enable = command.enable;
   for (std::size_t i = 0; i < static_cast<std::size_t>(stand_.wheels); ++i) {
     const auto wheel = static_cast<std::size_t>(stand_.wiring.wheel_of_motor[i]);

@@ -26,9 +26,9 @@ namespace {
 constexpr std::size_t kQueueTicks = 1024;  // five seconds at 200 Hz
 constexpr auto kIdle = std::chrono::milliseconds(2);
 
-template <class T, std::size_t N>
-void copy(const std::array<T, N>& from, T (&to)[N]) {
-  std::copy(from.begin(), from.end(), to);
+template <class Array, class T, std::size_t N>
+void copy(const Array& from, T (&to)[N]) {
+  std::copy(std::begin(from), std::end(from), to);
 }
 
 state_t to_message(const StateRecord& s) {
@@ -166,8 +166,7 @@ class Telemetry::Writer {
     copy(r.raw.encoder_counts, m.encoder_counts);
     copy(r.raw.attitude_wxyz, m.attitude_wxyz);
     m.battery_counts = r.raw.battery_counts;
-    m.valid = (r.raw.imu_ok ? 1 : 0) | (r.raw.encoders_ok ? 2 : 0) | (r.raw.battery_ok ? 4 : 0) |
-              (r.raw.attitude_ok ? 8 : 0);
+    m.valid = static_cast<std::int32_t>(r.raw.valid);
     m.health = static_cast<std::int32_t>(r.raw.health);
     emit("EQUIPOISE_SENSORS", m);
   }

@@ -6,11 +6,12 @@
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/io/mock.hpp"
 #include "app/commission/practice.hpp"
+#include "app/io/mock.hpp"
 #include "equipoise/config.hpp"
-#include "robots/mip/config.hpp"
 #include "robots/mbbr/config.hpp"
+#include "robots/mip/config.hpp"
+#include "support/assign.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -193,8 +194,8 @@ TEST(CalibrationFile, RoundTripsAndReachesTheConfigurationInBodyAxes) {
   EXPECT_LT((c.gyro_bias_B_rad_s - Vec3(0.0, 0.01, 0.0)).norm(), 1e-15);  // sensor x is body y
   EXPECT_LT((c.accel_bias_B_m_s2 - Vec3(-0.1, 0.0, 0.0)).norm(), 1e-15);
   EXPECT_EQ(c.accel_scale_S, Vec3(1.01, 0.99, 1.0));
-  RawSample raw;
-  raw.accel_counts = {0.0, 4096.0, 0.0};
+  RawSample raw{};
+  assign(raw.accel_counts, {0.0, 4096.0, 0.0});
   EXPECT_NEAR(calibrate<3>(raw, c).accel_B_m_s2.x(), 0.99 * kGravity_m_s2 - 0.1, 1e-12);  // [T] (5.26)
 }
 

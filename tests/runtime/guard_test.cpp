@@ -232,7 +232,7 @@ TEST_F(GuardProcess, MotorsStayOffWhenAStoppedLoopWakesUp) {
 TEST(SupervisorTest, ADeadGuardForbidsMotors) {
   runtime::HeartbeatPage page{};
   runtime::Supervisor supervisor({}, &page, 0);
-  RawSample raw;
+  RawSample raw{};
   std::int64_t now = 1'000'000'000;
   const auto tick = [&](bool guard_lives) {
     now += kTick_ns;
@@ -256,7 +256,7 @@ TEST(SupervisorTest, ADeadGuardForbidsMotors) {
 
 TEST(SupervisorTest, AFailedWriteForbidsMotors) {
   runtime::Supervisor supervisor({}, nullptr, kRealtimeMissing);
-  RawSample raw;
+  RawSample raw{};
   raw.t_ns = kTick_ns;
   EXPECT_EQ(supervisor.begin(kTick_ns, raw), kRealtimeMissing);
   supervisor.end(false, -EIO);

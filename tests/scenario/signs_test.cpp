@@ -24,7 +24,7 @@ TEST(Signs, PositiveDutyTurnsTheBallPositivelyAboutThatWheelsAxis) {
     for (const double sign : {1.0, -1.0}) {
       app::MbbrRig rig(config_with_tilt(0.0), ideal());
       const RawSample before = rig.world.sense();
-      MotorCommand command;
+      MotorCommand command{};
       command.enable = true;
       command.duty[wheel] = sign * 0.5;
       for (int i = 0; i < 4; ++i) rig.world.advance(command);

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "app/run/firmware.hpp"
 #include "app/io/plant_backend.hpp"
+#include "app/run/firmware.hpp"
 
 namespace equipoise {
 
@@ -35,7 +35,7 @@ FlightEnd fly_with(const app::Choice& choice, std::uint64_t seed, double seconds
   auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), seed);
   return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
     FlightEnd end;
-    MotorCommand motors;
+    MotorCommand motors{};
     constexpr int kRestTicks = 100;
     for (int tick = 0; tick < kRestTicks + static_cast<int>(seconds * kTickHz); ++tick) {
       world.advance(motors);

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "equipoise/config.hpp"
-#include "robots/mip/config.hpp"
 #include "robots/mbbr/config.hpp"
+#include "robots/mip/config.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -6,6 +6,8 @@
 #include <set>
 #include <string>
 
+#include "support/assign.hpp"
+
 namespace equipoise {
 namespace {
 
@@ -18,8 +20,8 @@ SafetyInputs well() {
 }
 
 MotorCommand half() {
-  MotorCommand command;
-  command.duty = {0.5, 0.5, 0.5, 0.0};
+  MotorCommand command{};
+  assign(command.duty, {0.5, 0.5, 0.5, 0.0});
   return command;
 }
 

@@ -72,7 +72,7 @@ class SimulatedMotors {
   double resistance_ohm_;
   double diode_drop_V_;
   double battery_V_;
-  MotorCommand command_;
+  MotorCommand command_{};
   std::array<DriveCoastCommand, N> held_{};  // the integrator asks at many speeds per command
 };
 

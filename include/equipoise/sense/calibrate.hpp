@@ -28,7 +28,8 @@ inline Vec3 euler_angles(const Mat3& R_WB) noexcept {
 }
 
 /// Rotation matrix of a quaternion (w, x, y, z), normalised; NaN from a zero quaternion.
-inline Mat3 rotation(const std::array<double, 4>& wxyz) noexcept {
+template <class Wxyz>
+Mat3 rotation(const Wxyz& wxyz) noexcept {
   const double norm =
       std::sqrt(wxyz[0] * wxyz[0] + wxyz[1] * wxyz[1] + wxyz[2] * wxyz[2] + wxyz[3] * wxyz[3]);
   const double w = wxyz[0] / norm;
@@ -58,10 +59,10 @@ Measurement<Wheels> calibrate(const RawSample& raw, const Calibration& c) noexce
   }
   z.battery_V = c.battery_V_per_count * raw.battery_counts + c.battery_offset_V;
   z.attitude_rad = euler_angles(rotation(raw.attitude_wxyz) * c.R_BS.transpose());
-  z.imu_ok = raw.imu_ok;
-  z.encoders_ok = raw.encoders_ok;
-  z.battery_ok = raw.battery_ok;
-  z.attitude_ok = raw.attitude_ok;
+  z.imu_ok = imu_ok(raw);
+  z.encoders_ok = encoders_ok(raw);
+  z.battery_ok = battery_ok(raw);
+  z.attitude_ok = attitude_ok(raw);
   return z;
 }
 

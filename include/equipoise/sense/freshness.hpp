@@ -3,6 +3,9 @@
 // several times is stuck; an encoder that moves further than its wheel can turn has jumped. RT-safe.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
+
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
@@ -27,22 +30,23 @@ class Freshness {
   Fresh update(const RawSample& raw) noexcept {
     Fresh fresh;
     const double dt_s = 1e-9 * static_cast<double>(raw.t_ns - last_.t_ns);
-    const bool same = raw.gyro_counts == last_.gyro_counts && raw.accel_counts == last_.accel_counts;
-    identical_ = primed_ && raw.imu_ok && same ? identical_ + 1 : 0;
+    const bool same =
+        equal(raw.gyro_counts, last_.gyro_counts) && equal(raw.accel_counts, last_.accel_counts);
+    identical_ = primed_ && imu_ok(raw) && same ? identical_ + 1 : 0;
     const bool stuck = p_.max_identical_samples > 0 && identical_ >= p_.max_identical_samples;
-    fresh.imu = raw.imu_ok && !stuck && (!primed_ || dt_s > 0.0);
+    fresh.imu = imu_ok(raw) && !stuck && (!primed_ || dt_s > 0.0);
     fresh.imu_gap = primed_ && dt_s > (p_.max_missed_samples + 1.5) * kTickS;
-    fresh.attitude = raw.attitude_ok && (!primed_ || dt_s > 0.0);
-    if (primed_ && raw.encoders_ok && encoders_known_) {
-      for (std::size_t i = 0; i < raw.encoder_counts.size(); ++i) {
+    fresh.attitude = attitude_ok(raw) && (!primed_ || dt_s > 0.0);
+    if (primed_ && encoders_ok(raw) && encoders_known_) {
+      for (std::size_t i = 0; i < encoders_.size(); ++i) {
         const double moved = raw.encoder_counts[i] - encoders_[i];
         fresh.encoder_jump =
             fresh.encoder_jump || std::abs(moved) > p_.max_counts_per_tick * (1 + encoders_missed_);
       }
     }
-    encoders_missed_ = raw.encoders_ok ? 0 : encoders_missed_ + 1;
-    if (raw.encoders_ok) {
-      encoders_ = raw.encoder_counts;
+    encoders_missed_ = encoders_ok(raw) ? 0 : encoders_missed_ + 1;
+    if (encoders_ok(raw)) {
+      std::copy(std::begin(raw.encoder_counts), std::end(raw.encoder_counts), encoders_.begin());
       encoders_known_ = true;
     }
     last_ = raw;
@@ -51,8 +55,13 @@ class Freshness {
   }
 
  private:
+  template <std::size_t N>
+  static bool equal(const double (&a)[N], const double (&b)[N]) noexcept {
+    return std::equal(std::begin(a), std::end(a), std::begin(b));
+  }
+
   FreshnessParams p_;
-  RawSample last_;
+  RawSample last_{};
   std::array<double, kMaxMotors> encoders_{};
   bool primed_ = false;
   bool encoders_known_ = false;

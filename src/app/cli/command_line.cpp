@@ -94,10 +94,12 @@ Option Subcommand::option(const std::string& name, std::int64_t& value, const st
 Option Subcommand::option(const std::string& name, std::uint64_t& value, const std::string& help) const {
   return Option(add_numbers<std::uint64_t>(impl_, name, value, help));
 }
-Option Subcommand::option(const std::string& name, std::vector<std::string>& value, const std::string& help) const {
+Option Subcommand::option(const std::string& name, std::vector<std::string>& value,
+                          const std::string& help) const {
   return Option(add(impl_, name, value, help));
 }
-Option Subcommand::option(const std::string& name, std::vector<double>& value, const std::string& help) const {
+Option Subcommand::option(const std::string& name, std::vector<double>& value,
+                          const std::string& help) const {
   return Option(add_numbers<double>(impl_, name, value, help));
 }
 Option Subcommand::option(const std::string& name, std::vector<int>& value, const std::string& help) const {

@@ -1,6 +1,6 @@
 // Subcommand-line options without the parser's header: a subcommand declares typed options and one action.
-// In: argv -> out: exit code: 0 success, 1 a job that failed, 2 bad usage (said on stderr). Numbers are checked:
-// NaN, infinity, a sign where none belongs and values that do not fit are refused. Start-up only.
+// In: argv -> out: exit code: 0 success, 1 a job that failed, 2 bad usage (said on stderr). Numbers are
+// checked: NaN, infinity, a sign where none belongs and values that do not fit are refused. Start-up only.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,8 @@ class Option {
   void* impl_;
 };
 
-/// A handle: copies name the same command. `name` of an option as "--long", "-s,--long" or, positional, "file".
+/// A handle: copies name the same command. `name` of an option as "--long", "-s,--long" or, positional,
+/// "file".
 class Subcommand {
  public:
   Subcommand subcommand(const std::string& name, const std::string& help) const;

@@ -4,12 +4,12 @@
 #include <memory>
 
 #include "app/board/board_edit.hpp"
-#include "app/commission/calibrate_imu.hpp"
-#include "app/commission/calibrate_wheels.hpp"
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
-#include "app/doctor/doctor.hpp"
+#include "app/commission/calibrate_imu.hpp"
+#include "app/commission/calibrate_wheels.hpp"
 #include "app/commission/workbench.hpp"
+#include "app/doctor/doctor.hpp"
 
 namespace equipoise::app {
 namespace {

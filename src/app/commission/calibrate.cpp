@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "app/commission/calibrate_imu.hpp"
-#include "app/commission/calibrate_wheels.hpp"
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
+#include "app/commission/calibrate_imu.hpp"
+#include "app/commission/calibrate_wheels.hpp"
 #include "app/commission/workbench.hpp"
 
 namespace equipoise::app {
@@ -210,11 +210,15 @@ int run_calibrate(const Arguments& a) {
 }  // namespace
 
 void add_calibrate(Subcommand app) {
-  const Subcommand command = app.subcommand("calibrate", "Measures a robot at rest or on its stand; keeps the result");
+  const Subcommand command =
+      app.subcommand("calibrate", "Measures a robot at rest or on its stand; keeps the result");
   auto a = std::make_shared<Arguments>();
-  command.option("what", a->what,
-                   "gyro: bias, 3 s at rest; accel: bias and scale, six sides up; mount: how the board sits; "
-                   "motors: which wheel each turns and which way; encoders: counts per turn, by hand").required().one_of({"gyro", "accel", "mount", "motors", "encoders"});
+  command
+      .option("what", a->what,
+              "gyro: bias, 3 s at rest; accel: bias and scale, six sides up; mount: how the board sits; "
+              "motors: which wheel each turns and which way; encoders: counts per turn, by hand")
+      .required()
+      .one_of({"gyro", "accel", "mount", "motors", "encoders"});
   add_options(command, &a->bench);
   command.option("--out", a->out, "calibration file to add to").show_default();
   command.option("--json", a->json, "result as JSON, - for stdout");

@@ -5,8 +5,8 @@
 
 #include <array>
 
-#include "equipoise/sense/calibrate.hpp"
 #include "app/commission/session.hpp"
+#include "equipoise/sense/calibrate.hpp"
 
 namespace equipoise::app {
 

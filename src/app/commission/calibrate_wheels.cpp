@@ -26,7 +26,7 @@ std::string format(const char* text, Args... args) {
 }
 
 Vec3 gyro_of(const RawSample& raw, const Calibration& c) {
-  return c.R_BS * (c.gyro_rad_s_per_count * Eigen::Map<const Vec3>(raw.gyro_counts.data()));
+  return c.R_BS * (c.gyro_rad_s_per_count * Eigen::Map<const Vec3>(raw.gyro_counts));
 }
 
 /// Travel of every encoder since `start`, turns.

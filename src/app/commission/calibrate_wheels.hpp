@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "app/board/board.hpp"
+#include "app/commission/session.hpp"
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/sense/calibrate.hpp"
 #include "robots/mbbr/mbbr.hpp"
 #include "robots/mip/mip.hpp"
-#include "equipoise/sense/calibrate.hpp"
-#include "app/commission/session.hpp"
 
 namespace equipoise::app {
 

@@ -8,9 +8,9 @@
 
 #include "app/board/board.hpp"
 #include "app/commission/calibrate_wheels.hpp"
-#include "equipoise/plant/stand_world.hpp"
-#include "app/io/plant_backend.hpp"
 #include "app/commission/session.hpp"
+#include "app/io/plant_backend.hpp"
+#include "equipoise/plant/stand_world.hpp"
 
 namespace equipoise::app {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "equipoise/runtime/monotonic.hpp"
 #include "app/cli/interrupt.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr int kMayMiss = 4;  // samples in a row, as in the self-test
 
 std::string missing_of(const RawSample& raw) {
-  if (!raw.imu_ok) return "the IMU delivers no valid sample";
+  if (!imu_ok(raw)) return "the IMU delivers no valid sample";
   return "an encoder cannot be read";
 }
 
@@ -26,11 +26,9 @@ RawSample Session::next() {
     const int status = hardware_.wait_tick(&now_ns);
     if (status != 0) throw JobError(std::string("no tick: ") + std::strerror(-status) + "; motors are off");
     beat();
-    rio_sensors_t sensors{};
-    if (rio_read_sensors(&io_, &sensors) != 0) sensors.valid = 0;
-    const RawSample raw = from_rio(sensors);
-    if (raw.imu_ok && raw.encoders_ok) {
-      temperature_degC_ = sensors.imu_temperature_degC;
+    const RawSample raw = hardware_.read();
+    if (imu_ok(raw) && encoders_ok(raw)) {
+      temperature_degC_ = raw.imu_temperature_degC;
       return raw;
     }
     if (missed >= kMayMiss) throw JobError(missing_of(raw) + " (equipoise doctor finds the cause)");
@@ -60,8 +58,8 @@ RawSample Session::sample() {
 }
 
 RawSample Session::drive(const std::array<double, kMaxMotors>& duty) {
-  MotorCommand command;
-  command.duty = duty;
+  MotorCommand command{};
+  std::copy(duty.begin(), duty.end(), command.duty);
   command.enable = true;
   if (heartbeat_ != nullptr) heartbeat_->want_enable.store(1, std::memory_order_relaxed);
   const int status = hardware_.write(command);
@@ -85,8 +83,8 @@ Stillness Session::hold_still(double seconds) {
   Stillness s;
   for (int n = 0; n < count; ++n) {
     const RawSample raw = sample();
-    const Eigen::Map<const Vec3> gyro(raw.gyro_counts.data());
-    const Eigen::Map<const Vec3> accel(raw.accel_counts.data());
+    const Eigen::Map<const Vec3> gyro(raw.gyro_counts);
+    const Eigen::Map<const Vec3> accel(raw.accel_counts);
     // Welford's means keep the small spread of large numbers.
     const Vec3 gyro_step = gyro - s.gyro;
     const Vec3 accel_step = accel - s.accel;

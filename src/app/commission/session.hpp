@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "app/io/hardware.hpp"
 #include "equipoise/runtime/heartbeat.hpp"
 #include "equipoise/types.hpp"
-#include "app/io/hardware.hpp"
 
 namespace equipoise::app {
 

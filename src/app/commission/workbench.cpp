@@ -7,11 +7,11 @@
 #include <cerrno>
 #include <cstdio>
 
-#include "bbb.h"
 #include "app/cli/commands.hpp"
-#include "app/run/firmware.hpp"
 #include "app/cli/interrupt.hpp"
 #include "app/commission/self_test.hpp"
+#include "app/run/firmware.hpp"
+#include "bbb.h"
 
 namespace equipoise::app {
 namespace {
@@ -51,7 +51,9 @@ bool ask_person(const Request& request, std::string* answer) {
 void add_options(Subcommand command, WorkbenchArguments* a) {
   command.option("--config", a->config, "robot configuration, TOML").required();
   command.option("--board", a->board, "wiring, TOML; see config/boards").required();
-  command.option("--backend", a->backend, "board, or stand: a simulated robot to practise on").show_default().one_of({"board", "stand"});
+  command.option("--backend", a->backend, "board, or stand: a simulated robot to practise on")
+      .show_default()
+      .one_of({"board", "stand"});
   command.option("--seed", a->seed, "of the practice robot's sensors").show_default();
   command.option("--practice-fault", a->faults, "of the practice robot, e.g. motor-1-reversed");
 }

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "app/cli/command_line.hpp"
-#include "app/guard/guard_process.hpp"
 #include "app/commission/practice.hpp"
 #include "app/commission/session.hpp"
+#include "app/guard/guard_process.hpp"
 
 namespace equipoise::app {
 

@@ -7,8 +7,8 @@
 #include <cstring>
 #include <filesystem>
 
-#include "dmp.h"
 #include "app/doctor/doctor.hpp"
+#include "dmp.h"
 #include "i2c_dev.h"
 #include "mpu9250_registers.h"
 #include "sysfs.h"

@@ -116,7 +116,7 @@ nlohmann::json bench_wake(const Arguments& a) {
     const std::int64_t now_ns = runtime::monotonic_now_ns();
     (is_ours ? ours : bare).push_back(now_ns - due_ns);
     if (is_ours) {
-      RawSample raw;
+      RawSample raw{};
       raw.t_ns = due_ns;
       (void)supervisor.begin(now_ns, raw);
       supervisor.end(true, 0);

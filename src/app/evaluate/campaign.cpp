@@ -5,8 +5,8 @@
 #include <random>
 
 #include "app/cli/commands.hpp"
-#include "app/evaluate/fault_flight.hpp"
 #include "app/cli/reasons.hpp"
+#include "app/evaluate/fault_flight.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -161,16 +161,20 @@ int campaign(const Arguments& a) {
 }  // namespace
 
 void add_campaign(Subcommand app) {
-  const Subcommand command = app.subcommand("campaign", "break every part in every phase of flight, in simulated time");
+  const Subcommand command =
+      app.subcommand("campaign", "break every part in every phase of flight, in simulated time");
   auto a = std::make_shared<Arguments>();
   command.option("--config", a->config, "robot configuration").required();
   command.option("--seeds", a->seeds, "flights per case").show_default().range(1, 1000);
   command.option("--seed", a->seed, "the first").show_default();
-  command.option("--soak-hours", a->soak_h, "then random flights, hours of robot time").show_default().range(0.0, 10000.0);
+  command.option("--soak-hours", a->soak_h, "then random flights, hours of robot time")
+      .show_default()
+      .range(0.0, 10000.0);
   command.option("--markdown", a->markdown, "table for docs/reliability.md");
   command.option("--json", a->json, "cases as JSON, - for stdout");
-  command.action([=] { return with_robot(robot_type(a->config), a->config,
-                         [&](auto firmware) { return campaign<decltype(firmware)>(*a); });
+  command.action([=] {
+    return with_robot(robot_type(a->config), a->config,
+                      [&](auto firmware) { return campaign<decltype(firmware)>(*a); });
   });
 }
 

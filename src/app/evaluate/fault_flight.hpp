@@ -7,10 +7,10 @@
 #include <cmath>
 #include <memory>
 
-#include "equipoise/runtime/timing.hpp"
 #include "app/io/fault_backend.hpp"
-#include "app/run/firmware.hpp"
 #include "app/io/plant_backend.hpp"
+#include "app/run/firmware.hpp"
+#include "equipoise/runtime/timing.hpp"
 
 namespace equipoise::app {
 

@@ -3,10 +3,10 @@
 // Used by the fault campaign, the soak and tests. Simulation only; allocates nothing after construction.
 #pragma once
 
+#include "app/io/plant_backend.hpp"
 #include "equipoise/config.hpp"
 #include "robots/mbbr/config.hpp"
 #include "robots/mbbr/world.hpp"
-#include "app/io/plant_backend.hpp"
 
 namespace equipoise::app {
 

@@ -11,10 +11,10 @@
 
 #include "app/board/board.hpp"
 #include "app/cli/commands.hpp"
-#include "equipoise/runtime/monotonic.hpp"
-#include "equipoise/runtime/realtime.hpp"
 #include "app/cli/interrupt.hpp"
 #include "app/run/service_notify.hpp"
+#include "equipoise/runtime/monotonic.hpp"
+#include "equipoise/runtime/realtime.hpp"
 
 namespace equipoise::app {
 GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::HeartbeatPage& page,
@@ -123,19 +123,22 @@ int run(const Arguments& a) {
 }  // namespace
 
 void add_guard(Subcommand app) {
-  const Subcommand command = app.subcommand("guard", "stop the motors when the loop is dead, stopped or hanging");
+  const Subcommand command =
+      app.subcommand("guard", "stop the motors when the loop is dead, stopped or hanging");
   auto a = std::make_shared<Arguments>();
   command.option("--heartbeat", a->heartbeat, "shared-memory name").show_default();
   command.option("--board", a->board, "wiring, TOML: the bridges to hold; see config/boards");
   command.option("--enable", a->enable, "value file of the bridge enable line: 1 awake, 0 asleep");
   command.option("--pwm", a->pwm, "duty_cycle file of each motor's PWM channel, instead of --board");
   command.option("--period-ms", a->period_ms, "the loop's tick").show_default().range(0.5, 1000.0);
-  command.option("--silent-ticks", a->silent_ticks, "ticks without a beat until the motors stop").show_default().range(1, 100);
-  command.option("--priority", a->priority, "SCHED_FIFO priority, above the loop's; 0: none").show_default().range(0, 99);
-  command.option("--parent", a->parent,
-                      "end with this process, whose child this is (run starts its own)");
-  command.option("--complain-fd", a->complain_fd,
-                      "where to say why it cannot start (run passes a pipe)");
+  command.option("--silent-ticks", a->silent_ticks, "ticks without a beat until the motors stop")
+      .show_default()
+      .range(1, 100);
+  command.option("--priority", a->priority, "SCHED_FIFO priority, above the loop's; 0: none")
+      .show_default()
+      .range(0, 99);
+  command.option("--parent", a->parent, "end with this process, whose child this is (run starts its own)");
+  command.option("--complain-fd", a->complain_fd, "where to say why it cannot start (run passes a pipe)");
   command.action([=] { return run(*a); });
 }
 

@@ -2,20 +2,25 @@
 
 #include <memory>
 
-#include "app/identify/bench_log.hpp"
 #include "app/cli/commands.hpp"
+#include "app/identify/bench_log.hpp"
 
 namespace equipoise::app {
 
 void add_friction_rig(Subcommand app) {
-  const Subcommand command = app.subcommand("friction-rig", "Simulated friction bench: the ball drives a flywheel");
+  const Subcommand command =
+      app.subcommand("friction-rig", "Simulated friction bench: the ball drives a flywheel");
   auto p = std::make_shared<FrictionRigParams>();
   auto log = std::make_shared<std::string>();
   command.option("--log", *log, "LCM event log, for identify friction").required();
   command.option("--coulomb-N-m", p->coulomb_N_m).show_default().range(0.0, 1.0);
   command.option("--viscous-N-m-s", p->viscous_N_m_s).show_default().range(0.0, 1.0);
-  command.option("--static-ratio", p->static_ratio, "breakaway over Coulomb friction").show_default().range(1.0, 5.0);
-  command.option("--negative-scale", p->negative_scale, "Coulomb friction backwards over forwards").show_default().range(0.1, 10.0);
+  command.option("--static-ratio", p->static_ratio, "breakaway over Coulomb friction")
+      .show_default()
+      .range(1.0, 5.0);
+  command.option("--negative-scale", p->negative_scale, "Coulomb friction backwards over forwards")
+      .show_default()
+      .range(0.1, 10.0);
   command.option("--amplitude-u", p->amplitude_u).show_default().range(0.0, 3.0);
   command.option("--seed", p->seed).show_default();
   command.action([=] {

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
-#include "equipoise/config.hpp"
 #include "app/identify/identification.hpp"
+#include "equipoise/config.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -90,26 +90,38 @@ void add_motor(Subcommand identify, const std::shared_ptr<Arguments>& a) {
   const Subcommand motor = identify.subcommand("motor", "R, k, L and friction from a drive/brake log");
   add_common(motor, a);
   motor.option("--inertia-kg-m2", a->inertia_kg_m2, "of the flywheel, when it is known").range(1e-7, 10.0);
-  motor.action([=] { return report(*a, identify_motor(read_bench_log(a->log), a->inertia_kg_m2),
-                     {"motor", {"resistance_ohm", "torque_constant_N_m_A", "inductance_H"}}); });
+  motor.action([=] {
+    return report(*a, identify_motor(read_bench_log(a->log), a->inertia_kg_m2),
+                  {"motor", {"resistance_ohm", "torque_constant_N_m_A", "inductance_H"}});
+  });
 }
 
 void add_friction(Subcommand identify, const std::shared_ptr<Arguments>& a) {
-  const Subcommand friction = identify.subcommand("friction", "J_f, mu_c, mu_v of a ball on a flywheel, [T] (5.34)-(5.37)");
+  const Subcommand friction =
+      identify.subcommand("friction", "J_f, mu_c, mu_v of a ball on a flywheel, [T] (5.34)-(5.37)");
   add_common(friction, a);
-  friction.option("--k1-N-m", a->rig.k1_N_m, "torque about the ball per unit of u").show_default().range(1e-6, 100.0);
-  friction.option("--k2-ball-N-m-s", a->rig.k2_ball_N_m_s, "back-EMF about the ball").show_default().range(0.0, 10.0);
-  friction.option("--radius-ratio", a->rig.flywheel_over_ball_radius, "flywheel's radius over the ball's").show_default().range(0.01, 100.0);
+  friction.option("--k1-N-m", a->rig.k1_N_m, "torque about the ball per unit of u")
+      .show_default()
+      .range(1e-6, 100.0);
+  friction.option("--k2-ball-N-m-s", a->rig.k2_ball_N_m_s, "back-EMF about the ball")
+      .show_default()
+      .range(0.0, 10.0);
+  friction.option("--radius-ratio", a->rig.flywheel_over_ball_radius, "flywheel's radius over the ball's")
+      .show_default()
+      .range(0.01, 100.0);
   friction.flag("--separate-directions", a->rig.separate_directions, "Coulomb friction per direction");
   friction.flag("--stribeck", a->rig.stribeck, "excess at low speed");
-  friction.action([=] { return report(*a, identify_friction(read_bench_log(a->log), a->rig),
-                     {"robot", {"coulomb_friction_N_m", "viscous_friction_N_m_s"}}); });
+  friction.action([=] {
+    return report(*a, identify_friction(read_bench_log(a->log), a->rig),
+                  {"robot", {"coulomb_friction_N_m", "viscous_friction_N_m_s"}});
+  });
 }
 
 }  // namespace
 
 void add_identify(Subcommand app) {
-  const Subcommand command = app.subcommand("identify", "Parameters from bench logs, with confidence intervals");
+  const Subcommand command =
+      app.subcommand("identify", "Parameters from bench logs, with confidence intervals");
   command.require_subcommand();
   auto a = std::make_shared<Arguments>();
   add_motor(command, a);

@@ -3,8 +3,8 @@
 #include <fstream>
 #include <memory>
 
-#include "app/identify/bench_log.hpp"
 #include "app/cli/commands.hpp"
+#include "app/identify/bench_log.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -120,8 +120,12 @@ void add_motor_bench(Subcommand app) {
   command.option("--motor", a->motors, "1 to 3, [T] Table 4.2 (default: all)").range(1, 3);
   command.option("--driver", a->drivers, "1 to 3, [T] Table 4.2 (default: all)").range(1, 3);
   command.option("--pwm-hz", a->pwm_hz, "PWM frequencies, Hz (default: 500 to 20000)").range(100.0, 100e3);
-  command.option("--mode", a->mode, "drive_coast or drive_brake").show_default().one_of({"drive_coast", "drive_brake"});
-  command.option("--inertia-kg-m2", a->inertia_kg_m2, "of the flywheel, at the motor's output").show_default().range(1e-5, 1.0);
+  command.option("--mode", a->mode, "drive_coast or drive_brake")
+      .show_default()
+      .one_of({"drive_coast", "drive_brake"});
+  command.option("--inertia-kg-m2", a->inertia_kg_m2, "of the flywheel, at the motor's output")
+      .show_default()
+      .range(1e-5, 1.0);
   command.option("--seed", a->seed, "seed of the sensors' noise").show_default();
   const Option log = command.option("--log", a->log, "LCM event log of one case, for identify motor");
   command.flag("--locked-step", a->locked_step, "log a step with the shaft locked, at 200 kHz").needs(log);

@@ -25,11 +25,11 @@ class PlantBackend {
     return 0;
   }
   static int read_sensors(void* p, rio_sensors_t* out) {
-    *out = to_rio(self(p).world_.sense());
+    *out = self(p).world_.sense();
     return 0;
   }
   static int write_motors(void* p, const rio_motors_t* motors) {
-    self(p).command_ = from_rio(*motors);
+    self(p).command_ = *motors;
     return 0;
   }
   static int motors_off(void* p) {
@@ -39,7 +39,7 @@ class PlantBackend {
   static void close(void* p) { motors_off(p); }
 
   World& world_;
-  MotorCommand command_;
+  MotorCommand command_{};
 };
 
 }  // namespace equipoise::app

@@ -24,9 +24,9 @@ bool decode(std::string_view data, Message* message) {
   return message->decode(data.data(), 0, size) == size;
 }
 
-template <std::size_t N>
-void copy(const double (&from)[N], std::array<double, N>& to) {
-  std::copy(from, from + N, to.begin());
+template <std::size_t N, class To>
+void copy(const double (&from)[N], To& to) {
+  std::copy(std::begin(from), std::end(from), std::begin(to));
 }
 
 /// Decodes into the current tick; a message of another tick is not taken.
@@ -84,17 +84,14 @@ FlightLog parse_flight_log(std::string_view bytes, const std::string& origin) {
 FlightLog read_flight_log(const std::string& path) { return parse_flight_log(read_log_parts(path), path); }
 
 RawSample raw_of(const sensors_t& m) noexcept {
-  RawSample raw;
+  RawSample raw{};
   raw.t_ns = m.t_ns;
   copy(m.gyro_counts, raw.gyro_counts);
   copy(m.accel_counts, raw.accel_counts);
   copy(m.encoder_counts, raw.encoder_counts);
   copy(m.attitude_wxyz, raw.attitude_wxyz);
   raw.battery_counts = m.battery_counts;
-  raw.imu_ok = (m.valid & 1) != 0;
-  raw.encoders_ok = (m.valid & 2) != 0;
-  raw.battery_ok = (m.valid & 4) != 0;
-  raw.attitude_ok = (m.valid & 8) != 0;
+  raw.valid = static_cast<std::uint32_t>(m.valid);
   raw.health = static_cast<std::uint32_t>(m.health);
   return raw;
 }

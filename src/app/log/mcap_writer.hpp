@@ -2,11 +2,12 @@
 // Not for the tick.
 #pragma once
 
-#include "app/cli/json.hpp"
 #include <cstdint>
 #include <map>
 #include <ostream>
 #include <string>
+
+#include "app/cli/json.hpp"
 
 namespace equipoise::app {
 

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "app/cli/commands.hpp"
-#include "app/run/firmware.hpp"
 #include "app/log/flight_log.hpp"
+#include "app/run/firmware.hpp"
 
 namespace equipoise::app {
 namespace {

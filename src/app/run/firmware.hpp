@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
-#include "robots/mbbr/config.hpp"
-#include "robots/mip/config.hpp"
-#include "robots/mbbr/world.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/runtime/telemetry.hpp"
+#include "robots/mbbr/config.hpp"
+#include "robots/mbbr/world.hpp"
+#include "robots/mip/config.hpp"
 
 namespace equipoise::app {
 
@@ -199,7 +199,7 @@ void record_tick(std::int64_t tick, std::int64_t now_ns, const RawSample& raw, c
     record->u_lin[static_cast<std::size_t>(i)] = t.u_lin(i);
     record->u_friction[static_cast<std::size_t>(i)] = t.u_friction(i);
   }
-  record->duty = t.motors.duty;
+  std::copy(std::begin(t.motors.duty), std::end(t.motors.duty), record->duty.begin());
   record->enable = t.motors.enable;
   record->saturated = t.saturated;
   record->arm_state = static_cast<std::int32_t>(t.arm_state);

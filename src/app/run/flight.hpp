@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/cli/interrupt.hpp"
+#include "app/io/hardware.hpp"
 #include "app/run/announcer.hpp"
+#include "app/run/firmware.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"
-#include "app/run/firmware.hpp"
-#include "app/io/hardware.hpp"
-#include "app/cli/interrupt.hpp"
 
 namespace equipoise::app {
 

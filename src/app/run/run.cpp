@@ -1,18 +1,18 @@
 #include <cstring>
 #include <filesystem>
 
-#include "bbb.h"
 #include "app/board/board.hpp"
 #include "app/cli/commands.hpp"
-#include "equipoise/runtime/command_receiver.hpp"
-#include "app/run/flight.hpp"
 #include "app/cli/key_file.hpp"
-#include "app/io/lockstep.hpp"
 #include "app/cli/reasons.hpp"
 #include "app/commission/self_test.hpp"
+#include "app/io/lockstep.hpp"
+#include "app/run/flight.hpp"
 #include "app/run/service_notify.hpp"
 #include "app/run/watched_flight.hpp"
 #include "app/run/wires.hpp"
+#include "bbb.h"
+#include "equipoise/runtime/command_receiver.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -290,38 +290,50 @@ int run(Arguments a) {
 }  // namespace
 
 void add_run(Subcommand app) {
-  const Subcommand command = app.subcommand("run", "Flies the robot: on its board, or against a physics engine");
+  const Subcommand command =
+      app.subcommand("run", "Flies the robot: on its board, or against a physics engine");
   auto a = std::make_shared<Arguments>();
   command.option("--config", a->config, "robot configuration, TOML").required();
   command.option("--backend", a->backend, "board or lockstep").show_default().one_of({"board", "lockstep"});
   command.option("--board", a->board, "wiring, TOML; see config/boards");
   command.option("--socket", a->socket, "lockstep: where to listen, a Unix SOCK_SEQPACKET path");
-  command.option("--timeout-s", a->timeout_s, "lockstep: longest wait for the engine, s").show_default().range(0.01, 3600.0);
-  command.option("--duration-s", a->duration_s, "stop after this long, s; 0: when told to").show_default().range(0.0, 360000.0);
+  command.option("--timeout-s", a->timeout_s, "lockstep: longest wait for the engine, s")
+      .show_default()
+      .range(0.01, 3600.0);
+  command.option("--duration-s", a->duration_s, "stop after this long, s; 0: when told to")
+      .show_default()
+      .range(0.0, 360000.0);
   command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second").range(-5.0, 5.0);
   command.option("--drive-mps", a->drive_mps, "drive speed, m/s").range(-2.0, 2.0);
   const Option arm = command.flag("--arm,!--no-arm", a->arm,
-                                "request the motors 0.5 s after the start (default: lockstep only)");
+                                  "request the motors 0.5 s after the start (default: lockstep only)");
   command.option("--command-key", a->command_key,
-                      "take commands of holders of this key (keygen, send) instead of the script");
-  command.option("--command-url", a->command_url,
-                   std::string("where to listen with --command-key: ") + kWireHelp +
-                       "; on a board also serial or can, as its file says").show_default();
+                 "take commands of holders of this key (keygen, send) instead of the script");
+  command
+      .option("--command-url", a->command_url,
+              std::string("where to listen with --command-key: ") + kWireHelp +
+                  "; on a board also serial or can, as its file says")
+      .show_default();
   command.option("--estimator", a->choice.estimator, "who controls (default: the robot's)");
   command.option("--controller", a->choice.controller, "state feedback (default: the robot's)");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command.option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
   command.option("--log", a->log, "LCM event log (default: logs/run-BACKEND.lcm)");
-  command.option("--log-max-mb", a->log_max_mb, "continue the log in a further file after this much, MB").show_default().range(1, 100000);
-  command.option("--log-min-free-mb", a->log_min_free_mb, "delete the run's oldest files below this, MB").show_default().range(0, 1000000);
+  command.option("--log-max-mb", a->log_max_mb, "continue the log in a further file after this much, MB")
+      .show_default()
+      .range(1, 100000);
+  command.option("--log-min-free-mb", a->log_min_free_mb, "delete the run's oldest files below this, MB")
+      .show_default()
+      .range(0, 1000000);
   command.option("--json", a->json, "summary as JSON, - for stdout");
   command.flag("--guard,!--no-guard", a->watch.guard,
-                    "board: a process that stops the motors when this one dies or hangs (default: yes)");
+               "board: a process that stops the motors when this one dies or hangs (default: yes)");
   command.flag("--realtime,!--without-realtime", a->watch.realtime,
-                    "board: motors only under real-time scheduling (default: yes)");
+               "board: motors only under real-time scheduling (default: yes)");
   command.option("--cpu", a->watch.cpu, "board: the loop's CPU; -1: any").show_default().range(-1, 1023);
-  command.option("--priority", a->watch.priority,
-                   "board: the loop's SCHED_FIFO priority, below the guard's").show_default().range(1, runtime::kGuardPriority - 1);
+  command.option("--priority", a->watch.priority, "board: the loop's SCHED_FIFO priority, below the guard's")
+      .show_default()
+      .range(1, runtime::kGuardPriority - 1);
   command.option("--telemetry", a->telemetry, "LCM provider URL, or off").show_default();
   command.action([=] {
     if (!arm.given()) a->arm = a->backend == "lockstep";

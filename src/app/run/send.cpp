@@ -5,11 +5,11 @@
 #include <optional>
 
 #include "app/cli/commands.hpp"
-#include "equipoise/runtime/command_auth.hpp"
-#include "equipoise/runtime/telemetry.hpp"
 #include "app/cli/interrupt.hpp"
 #include "app/cli/key_file.hpp"
 #include "app/run/wires.hpp"
+#include "equipoise/runtime/command_auth.hpp"
+#include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -115,8 +115,12 @@ void add_send(Subcommand app) {
   command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second").range(-5.0, 5.0);
   command.flag("--arm,!--disarm", a->arm, "motors on; off is the default");
   command.flag("--heading-reset", a->heading_reset, "forward is where the robot points now");
-  command.option("--duration-s", a->duration_s, "repeat for this long, s").show_default().range(0.0, 360000.0);
-  command.option("--timeout-s", a->timeout_s, "longest wait for the robot, s").show_default().range(0.1, 60.0);
+  command.option("--duration-s", a->duration_s, "repeat for this long, s")
+      .show_default()
+      .range(0.0, 360000.0);
+  command.option("--timeout-s", a->timeout_s, "longest wait for the robot, s")
+      .show_default()
+      .range(0.1, 60.0);
   command.action([=] { return send(*a); });
 }
 

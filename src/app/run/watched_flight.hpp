@@ -8,9 +8,9 @@
 #include <string>
 
 #include "app/cli/json.hpp"
+#include "app/guard/guard_process.hpp"
 #include "equipoise/runtime/realtime.hpp"
 #include "equipoise/runtime/supervisor.hpp"
-#include "app/guard/guard_process.hpp"
 
 namespace equipoise::app {
 

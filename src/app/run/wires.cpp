@@ -4,8 +4,8 @@
 #include <array>
 #include <cstring>
 
-#include "can.h"
 #include "app/cli/commands.hpp"
+#include "can.h"
 #include "serial.h"
 
 namespace equipoise::app {

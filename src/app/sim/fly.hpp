@@ -4,9 +4,9 @@
 
 #include <chrono>
 
-#include "equipoise/runtime/loop.hpp"
 #include "app/io/plant_backend.hpp"
 #include "app/sim/simulate.hpp"
+#include "equipoise/runtime/loop.hpp"
 
 namespace equipoise::app {
 

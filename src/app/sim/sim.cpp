@@ -5,9 +5,9 @@
 #include <thread>
 
 #include "app/cli/commands.hpp"
-#include "equipoise/runtime/telemetry.hpp"
 #include "app/cli/interrupt.hpp"
 #include "app/sim/simulate.hpp"
+#include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -175,16 +175,24 @@ void add_sim(Subcommand app) {
   command.option("--config", a->config, "robot configuration, TOML").required();
   const Option yaw_hz = command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second");
   yaw_hz.range(-5.0, 5.0);
-  command.option("--yaw-rad-s", a->options.yaw_rate_rad_s, "yaw rate, rad/s").range(-10.0 * kPi, 10.0 * kPi).excludes(yaw_hz);
+  command.option("--yaw-rad-s", a->options.yaw_rate_rad_s, "yaw rate, rad/s")
+      .range(-10.0 * kPi, 10.0 * kPi)
+      .excludes(yaw_hz);
   command.option("--drive-mps", a->options.drive_mps, "drive speed, m/s").range(-2.0, 2.0);
-  command.option("--duration-s", a->options.duration_s, "simulated time, s").show_default().range(0.01, 360000.0);
+  command.option("--duration-s", a->options.duration_s, "simulated time, s")
+      .show_default()
+      .range(0.01, 360000.0);
   command.option("--seed", a->options.seed, "seed of every random number").show_default();
   command.option("--estimator", a->choice.estimator, "which estimator controls: " + known_estimators());
   command.option("--controller", a->choice.controller, known_controllers());
   a->choice.fidelity = "full";
-  command.option("--fidelity", a->choice.fidelity, "ideal, thesis, full").show_default().one_of(kFidelityNames);
+  command.option("--fidelity", a->choice.fidelity, "ideal, thesis, full")
+      .show_default()
+      .one_of(kFidelityNames);
   a->choice.attitude = "dmp";
-  command.option("--attitude", a->choice.attitude, "attitude source: dmp (packets), own (our filter)").show_default().one_of({"dmp", "own"});
+  command.option("--attitude", a->choice.attitude, "attitude source: dmp (packets), own (our filter)")
+      .show_default()
+      .one_of({"dmp", "own"});
   command.option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command.option("--log", a->log, "LCM event log (default: logs/sim-...)");

@@ -1,5 +1,5 @@
-#include "equipoise/sense/attitude_filter.hpp"
 #include "app/verify/rows.hpp"
+#include "equipoise/sense/attitude_filter.hpp"
 
 namespace equipoise::app {
 
@@ -10,11 +10,15 @@ void add_attitude(Subcommand app) {
   auto rate_hz = std::make_shared<double>(kTickHz);
   auto arm = std::make_shared<std::vector<double>>(3, 0.0);
   auto average_s = std::make_shared<double>(AttitudeFilterParams{}.accel_time_constant_s);
-  command.option("--in", *in,
-                   "rows {gyro_rad_s, accel_m_s2}, body axes, specific force; mag, any unit, optional").required();
+  command
+      .option("--in", *in,
+              "rows {gyro_rad_s, accel_m_s2}, body axes, specific force; mag, any unit, optional")
+      .required();
   command.option("--rate-hz", *rate_hz, "of the rows").show_default().range(10.0, 10e3);
   command.option("--lever-arm-m", *arm, "from the point that moves least to the IMU: x y z").count(3);
-  command.option("--accel-time-constant-s", *average_s, "over which the specific force is averaged").show_default().range(0.1, 100.0);
+  command.option("--accel-time-constant-s", *average_s, "over which the specific force is averaged")
+      .show_default()
+      .range(0.1, 100.0);
   command.option("--json", *json, "rows {q_wxyz, gyro_bias_rad_s}; output file, - for stdout").show_default();
   command.action([=] {
     AttitudeFilterParams params;

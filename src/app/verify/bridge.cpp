@@ -1,5 +1,5 @@
-#include "equipoise/actuate/drive_coast.hpp"
 #include "app/verify/rows.hpp"
+#include "equipoise/actuate/drive_coast.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -29,7 +29,8 @@ nlohmann::json evaluate(const nlohmann::json& row) {
 }  // namespace
 
 void add_bridge(Subcommand app) {
-  const Subcommand command = app.subcommand("bridge", "Mean current of a drive/coast bridge, and its inverse, on rows of JSON");
+  const Subcommand command =
+      app.subcommand("bridge", "Mean current of a drive/coast bridge, and its inverse, on rows of JSON");
   auto in = std::make_shared<std::string>();
   auto json = std::make_shared<std::string>("-");
   command.option("--in", *in, "rows of {T_r, omega_r, u} or {T_r, omega_r, i_over_is}").required();

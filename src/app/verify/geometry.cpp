@@ -1,15 +1,20 @@
-#include "robots/mbbr/omniwheels.hpp"
 #include "app/verify/rows.hpp"
+#include "robots/mbbr/omniwheels.hpp"
 
 namespace equipoise::app {
 
 void add_geometry(Subcommand app) {
-  const Subcommand command = app.subcommand("geometry", "Orthogonal omniwheel placement: tilt, axes, load, torque shares");
+  const Subcommand command =
+      app.subcommand("geometry", "Orthogonal omniwheel placement: tilt, axes, load, torque shares");
   auto alpha_deg = std::make_shared<double>(60.0);
   auto azimuth_deg = std::make_shared<double>(-140.0);
   auto json = std::make_shared<std::string>();
-  command.option("--alpha-deg", *alpha_deg, "wheel latitude from the ball's north pole, 35.27 to 89").required().range(35.27, 89.0);
-  command.option("--azimuth-deg", *azimuth_deg, "rotation of all wheels about the vertical").show_default().range(-180.0, 180.0);
+  command.option("--alpha-deg", *alpha_deg, "wheel latitude from the ball's north pole, 35.27 to 89")
+      .required()
+      .range(35.27, 89.0);
+  command.option("--azimuth-deg", *azimuth_deg, "rotation of all wheels about the vertical")
+      .show_default()
+      .range(-180.0, 180.0);
   command.option("--json", *json, "output file, - for stdout");
   command.action([=] {
     const double degrees = kPi / 180.0;

@@ -1,9 +1,9 @@
 #include <functional>
 #include <map>
 
+#include "app/verify/rows.hpp"
 #include "robots/mbbr/dynamics.hpp"
 #include "robots/mip/dynamics.hpp"
-#include "app/verify/rows.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -61,14 +61,17 @@ const std::map<std::string, Model>& models() {
 }  // namespace
 
 void add_model(Subcommand app) {
-  const Subcommand command = app.subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON");
+  const Subcommand command =
+      app.subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON");
   auto robot = std::make_shared<std::string>();
   auto in = std::make_shared<std::string>();
   auto json = std::make_shared<std::string>("-");
   command.option("--robot", *robot, "mbbr or mip").required().one_of({"mbbr", "mip"});
-  command.option("--in", *in,
-                   "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
-                   "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}").required();
+  command
+      .option("--in", *in,
+              "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
+              "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}")
+      .required();
   command.option("--json", *json, "output file, - for stdout").show_default();
   command.action([=] {
     write_json(map_rows(*in, models().at(*robot)), *json);

@@ -1,7 +1,8 @@
+#include "robots/mbbr/config.hpp"
+
 #include <algorithm>
 
 #include "config/common_config.hpp"
-#include "robots/mbbr/config.hpp"
 
 namespace equipoise {
 namespace {

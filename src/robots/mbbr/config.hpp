@@ -19,7 +19,6 @@ namespace equipoise {
 using MbbrThesisPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrThesisFeedback>;
 using MbbrScheduledPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrScheduledFeedback>;
 
-
 struct MbbrConfig {
   MbbrParameters robot;
   MotorParameters motor;
@@ -37,7 +36,6 @@ struct MbbrConfig {
   MbbrThesisPipeline::Params thesis_pipeline() const;
   MbbrScheduledPipeline::Params scheduled_pipeline() const;
 };
-
 
 Loaded<MbbrConfig> load_mbbr(const std::string& path, const std::vector<std::string>& overrides);
 /// From text, e.g. of a log; `origin` names it in errors.

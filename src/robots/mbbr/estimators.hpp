@@ -8,10 +8,10 @@
 #include <array>
 
 #include "equipoise/estimate/kalman.hpp"
-#include "robots/mbbr/high_yaw.hpp"
-#include "robots/mbbr/published.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/mbbr.hpp"
+#include "robots/mbbr/published.hpp"
 
 namespace equipoise {
 

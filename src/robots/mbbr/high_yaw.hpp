@@ -6,8 +6,8 @@
 // just these sums. RT-safe.
 #pragma once
 
-#include "robots/mbbr/mbbr.hpp"
 #include "generated/mbbr_model.hpp"
+#include "robots/mbbr/mbbr.hpp"
 
 namespace equipoise {
 

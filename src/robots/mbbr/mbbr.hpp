@@ -3,9 +3,9 @@
 // RT-safe after construction.
 #pragma once
 
-#include "robots/mbbr/omniwheels.hpp"
 #include "equipoise/samples.hpp"
 #include "equipoise/types.hpp"
+#include "robots/mbbr/omniwheels.hpp"
 
 namespace equipoise {
 

@@ -5,8 +5,8 @@
 // (tools/derive, docs/derivation.md). Needs body-rate feedback. Stateless, RT-safe.
 #pragma once
 
-#include "robots/mbbr/reference.hpp"
 #include "generated/mbbr_gains.hpp"
+#include "robots/mbbr/reference.hpp"
 
 namespace equipoise {
 

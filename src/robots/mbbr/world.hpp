@@ -4,9 +4,9 @@
 // most mu_c. Simulation only; allocates nothing after construction; same seed, same bytes.
 #pragma once
 
+#include "equipoise/plant/sensors.hpp"
 #include "robots/mbbr/drive.hpp"
 #include "robots/mbbr/dynamics.hpp"
-#include "equipoise/plant/sensors.hpp"
 
 namespace equipoise {
 

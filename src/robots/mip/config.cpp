@@ -1,5 +1,6 @@
-#include "config/common_config.hpp"
 #include "robots/mip/config.hpp"
+
+#include "config/common_config.hpp"
 
 namespace equipoise {
 namespace {

@@ -19,7 +19,6 @@ namespace equipoise {
 using MipSlcPipeline = Pipeline<Mip, MipEstimators, MipReferenceStage, MipSlcFeedback>;
 using MipLqrPipeline = Pipeline<Mip, MipEstimators, MipReferenceStage, MipLqrFeedback>;
 
-
 struct MipConfig {
   MipParameters robot;
   MotorParameters motor;
@@ -37,7 +36,6 @@ struct MipConfig {
   MipSlcPipeline::Params slc_pipeline() const;
   MipLqrPipeline::Params lqr_pipeline() const;
 };
-
 
 Loaded<MipConfig> load_mip(const std::string& path, const std::vector<std::string>& overrides);
 /// From text, e.g. of a log; `origin` names it in errors.

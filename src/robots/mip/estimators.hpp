@@ -8,10 +8,10 @@
 #include <array>
 
 #include "equipoise/estimate/kalman.hpp"
-#include "robots/mip/models.hpp"
-#include "robots/mip/published.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
 #include "robots/mip/mip.hpp"
+#include "robots/mip/models.hpp"
+#include "robots/mip/published.hpp"
 
 namespace equipoise {
 

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "robots/mip/reference.hpp"
 #include "generated/mip_gains.hpp"
+#include "robots/mip/reference.hpp"
 
 namespace equipoise {
 

@@ -3,8 +3,8 @@
 // Source: [T] (3.1), (3.30), (3.32), (3.35)-(3.47); corrections in docs/derivation.md. RT-safe.
 #pragma once
 
-#include "robots/mip/mip.hpp"
 #include "generated/mip_model.hpp"
+#include "robots/mip/mip.hpp"
 
 namespace equipoise {
 

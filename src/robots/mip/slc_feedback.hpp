@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "robots/mip/reference.hpp"
 #include "generated/mip_gains.hpp"
+#include "robots/mip/reference.hpp"
 
 namespace equipoise {
 

@@ -8,9 +8,9 @@
 #include <array>
 
 #include "equipoise/plant/gear_play.hpp"
-#include "robots/mip/dynamics.hpp"
 #include "equipoise/plant/motors.hpp"
 #include "equipoise/plant/sensors.hpp"
+#include "robots/mip/dynamics.hpp"
 
 namespace equipoise {
 

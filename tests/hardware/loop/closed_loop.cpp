@@ -30,7 +30,7 @@ PinWorld::PinWorld(Bench& bench, const equipoise::app::Board& board, const equip
 }
 
 MotorCommand PinWorld::pins() const {
-  MotorCommand command;
+  MotorCommand command{};
   const auto channels = bench_.pwm();
   command.enable = bench_.pin(wiring_.enable.chip, wiring_.enable.line);
   for (int i = 0; i < kMotors; ++i) {

@@ -1,5 +1,4 @@
 #include "equipoise/config.hpp"
-#include "robots/mbbr/config.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,6 +8,8 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+
+#include "robots/mbbr/config.hpp"
 
 namespace equipoise {
 namespace {

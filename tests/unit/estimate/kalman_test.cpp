@@ -4,9 +4,9 @@
 
 #include <random>
 
+#include "robots/mbbr/dynamics.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/published.hpp"
-#include "robots/mbbr/dynamics.hpp"
 #include "support/oracle.hpp"
 
 namespace equipoise {

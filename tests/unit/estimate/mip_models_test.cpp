@@ -1,8 +1,7 @@
 // Coefficients from physics.md section 2 (derived) and [T] (3.38)-(3.47) (printed); Jacobians by differences.
-#include "robots/mip/models.hpp"
-
 #include <gtest/gtest.h>
 
+#include "robots/mip/models.hpp"
 #include "robots/mip/published.hpp"
 
 namespace equipoise {

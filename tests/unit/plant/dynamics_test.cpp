@@ -1,6 +1,7 @@
+#include "robots/mbbr/dynamics.hpp"
+
 #include <gtest/gtest.h>
 
-#include "robots/mbbr/dynamics.hpp"
 #include "robots/mip/dynamics.hpp"
 #include "support/oracle.hpp"
 

@@ -1,8 +1,9 @@
 // Each effect of the full world alone: with it the robot moves or measures differently, in the way it should.
 #include <gtest/gtest.h>
 
-#include "robots/mbbr/world.hpp"
 #include "equipoise/plant/switched_motor.hpp"
+#include "robots/mbbr/world.hpp"
+#include "support/assign.hpp"
 
 namespace equipoise {
 namespace {
@@ -23,7 +24,7 @@ class World {
   explicit World(const MbbrWorldParams& params)
       : world_(MbbrParameters(), MotorParameters(), Calibration(), params) {}
   const World& run(const Duties& duty, int ticks) {
-    MotorCommand command;
+    MotorCommand command{};
     command.enable = true;
     for (std::size_t i = 0; i < duty.size(); ++i) command.duty[i] = duty[i];
     for (int i = 0; i < ticks; ++i) {
@@ -46,7 +47,7 @@ class World {
 
  private:
   MbbrWorld world_;
-  RawSample raw_;
+  RawSample raw_{};
 };
 
 double spin_after(const MbbrWorldParams& w, double direction) {
@@ -63,9 +64,9 @@ TEST(MbbrDisturbance, StictionHoldsWhatCoulombFrictionLetsGo) {
   const double duty = 1.2 * robot.mu_c / (robot.r / robot.r_w * std::sqrt(3.0) * motor.k1());
   const auto turned = [&](const MbbrWorldParams& params) {
     MbbrWorld world(robot, brake, Calibration(), params);
-    MotorCommand command;
+    MotorCommand command{};
     command.enable = true;
-    command.duty = {duty, duty, duty};
+    assign(command.duty, {duty, duty, duty});
     for (int i = 0; i < 40; ++i) world.advance(command);
     return std::abs(world.truth().theta_z);
   };

@@ -4,13 +4,14 @@
 
 #include "equipoise/estimate/rest_tilt.hpp"
 #include "equipoise/sense/rotor_speed.hpp"
+#include "support/assign.hpp"
 
 namespace equipoise {
 namespace {
 
 TEST(Calibrate, AccelerometerAtRestUprightIsGravityDownwards) {
-  RawSample raw;
-  raw.accel_counts = {0.0, 0.0, 4096.0};  // a chip at rest reports +1 g of specific force
+  RawSample raw{};
+  assign(raw.accel_counts, {0.0, 0.0, 4096.0});  // a chip at rest reports +1 g of specific force
   const auto z = calibrate<3>(raw, Calibration{});
   EXPECT_NEAR(z.accel_B_m_s2.z(), -9.8, 1e-12);  // [T] (5.26): gravity minus acceleration
   EXPECT_NEAR(z.accel_B_m_s2.head<2>().norm(), 0.0, 1e-12);
@@ -21,9 +22,9 @@ TEST(Calibrate, CountsBecomeSiUnitsInBodyAxes) {
   c.R_BS << 0, -1, 0, 1, 0, 0, 0, 0, 1;  // sensor x is body y
   c.encoder_sign = {1, -1, 1, 1};
   c.gyro_bias_B_rad_s = Vec3(0.0, 0.1, 0.0);
-  RawSample raw;
-  raw.gyro_counts = {16.4, 0.0, 0.0};
-  raw.encoder_counts = {720.0, 360.0, 0.0, 0.0};
+  RawSample raw{};
+  assign(raw.gyro_counts, {16.4, 0.0, 0.0});
+  assign(raw.encoder_counts, {720.0, 360.0, 0.0, 0.0});
   raw.battery_counts = 1700.0;
   const auto z = calibrate<3>(raw, c);
   EXPECT_NEAR(z.gyro_B_rad_s.y(), kPi / 180.0 - 0.1, 1e-12);
@@ -34,10 +35,10 @@ TEST(Calibrate, CountsBecomeSiUnitsInBodyAxes) {
 
 TEST(Calibrate, AttitudeQuaternionBecomesRollPitchYawOfTheBody) {
   const double half = 0.15;
-  RawSample raw;
-  raw.attitude_wxyz = {std::cos(half), 0.0, std::sin(half), 0.0};
+  RawSample raw{};
+  assign(raw.attitude_wxyz, {std::cos(half), 0.0, std::sin(half), 0.0});
   EXPECT_NEAR(calibrate<3>(raw, Calibration{}).attitude_rad.y(), 0.3, 1e-12);
-  raw.attitude_wxyz = {0, 0, 0, 0};
+  assign(raw.attitude_wxyz, {0, 0, 0, 0});
   EXPECT_TRUE(calibrate<3>(raw, Calibration{}).attitude_rad.hasNaN());
 }
 

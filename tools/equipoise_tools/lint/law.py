@@ -8,14 +8,16 @@ from collections.abc import Iterator
 from .tree import C_SUFFIXES, Finding, Tree
 
 STAGES = ("sense", "estimate", "control", "actuate")
-# What a stage may include of ours besides its room: values, a robot's dimensions, generated code.
-STAGE_MAY_INCLUDE = re.compile(r"equipoise/(types|samples)\.hpp|equipoise/robots/.+|generated/.+")
+# What a stage may include of ours besides its room: values.
+STAGE_MAY_INCLUDE = re.compile(r"equipoise/(types|samples|config)\.hpp")
 # Files that may include more than one stage room, and why.
 JOINS_STAGES = {
     "include/equipoise/pipeline.hpp": "it is the tick",
-    "include/equipoise/config.hpp": "it gathers every stage's parameters",
+    "src/config/common_config.hpp": "it reads every stage's parameters",
     "include/equipoise/plant/world.hpp": "it plays sensors and motors from their stages' parameters",
 }
+# A robot composes stages; the application runs the whole.
+MAY_JOIN_STAGES = ("src/robots/", "src/app/", "src/main.cpp")
 JOINS_CORE_AND_DRIVERS = "src/app/"
 # The C++ library's headers that reach the operating system, block, print or know the time.
 OS_HEADERS = re.compile(
@@ -41,6 +43,8 @@ def includes(text: str) -> Iterator[tuple[int, str, bool]]:
 def is_core(name: str) -> bool:
     if name.startswith("include/equipoise/"):
         return not name.startswith("include/equipoise/runtime/")
+    if re.fullmatch(r"src/robots/\w+/config\.cpp", name):  # a robot's configuration reader
+        return False
     return name.startswith(tuple(f"src/{room}/" for room in ("robots", "plant", *STAGES)))
 
 
@@ -65,7 +69,7 @@ def outside_core(header: str, angle: bool, drivers: set[str]) -> str | None:
         return "core never includes drivers"
     if LIBRARIES_OUTSIDE_CORE.fullmatch(header):
         return "core is C++17 on Eigen: no LCM, configuration or command-line library"
-    if header.startswith(("equipoise/runtime/", "runtime/", "app/")):
+    if header.startswith(("equipoise/runtime/", "runtime/", "app/", "config/")):
         return "core never includes the runtime or the application"
     c_header = header.endswith(".h") and header not in C_HEADERS_IN_CORE
     if angle and (OS_HEADERS.fullmatch(header) or c_header):
@@ -92,7 +96,7 @@ def check_includes(tree: Tree) -> list[Finding]:
             if room and not angle and stage != room and not STAGE_MAY_INCLUDE.fullmatch(header):
                 message = f"includes {header}: a stage knows types, samples, robots and its own room"
                 findings.append(Finding(name, line, message))
-            elif stage and not name.startswith(("src/app/", "src/main.cpp")) and name not in JOINS_STAGES:
+            elif stage and not name.startswith(MAY_JOIN_STAGES) and name not in JOINS_STAGES:
                 stages_joined.add(stage)
                 if len(stages_joined) == 2:
                     findings.append(Finding(name, line, f"includes {header}: only pipeline.hpp joins stages"))
