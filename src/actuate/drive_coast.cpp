@@ -9,11 +9,6 @@ namespace {
 // With w = sign(u) omega_r: b = (1 + w)/2, d = (1 - w)/2. In s with 1 + b s = exp(v T_r), (4.30) reads
 // (i_avg/i_s) T_r/2 = log1p(b s) - b log1p(s), which has no cancellation left but at small s (series below).
 
-/// Duty above which the current never reaches zero, [T] (4.27).
-double boundary_duty(double T_r, double b, double d) noexcept {
-  return T_r > 0.0 ? 1.0 + std::log1p(d * std::expm1(-T_r)) / T_r : b;
-}
-
 /// (log1p(b s) - b log1p(s)) / (b d) as a function of t = log1p(s).
 double scaled_current(double t, double b, double d) noexcept {
   constexpr double kSeriesBelow = 0.02;  // nine terms leave 1e-17 relative
@@ -37,8 +32,34 @@ double scaled_current(double t, double b, double d) noexcept {
   return (t + std::log1p(d * std::expm1(-t)) / d) / b;
 }
 
-/// Solves scaled_current(t) = target; returns v T_r.
-double solve_exponent(double target, double b, double d, double exponent_max, int* iterations) noexcept {
+/// v T_r of scaled_current(t) = target, in s = expm1(t), away from the domain's edges: there nothing cancels.
+/// Starts from the inverse series, then Halley, whose derivatives are rational. With |log1p(s)| known, 1 + b
+/// s follows from the last step without another logarithm.
+double solve_inside(double target, double r, double b, double d, int* iterations) noexcept {
+  const double r2 = r * r;
+  double s = r + (1.0 + b) * r2 / 3.0 + (b * b + 11.0 * b + 1.0) * r2 * r / 36.0 -
+             (1.0 + b) * (b * b - 25.0 * b + 1.0) * r2 * r2 / 270.0;
+  constexpr double kStepDone = 1e-4;  // of s; cubic convergence: what is left is near 1e-12
+  double exponent = 0.0;
+  for (*iterations = 0; *iterations < 2;) {
+    const double drained = std::log1p(b * s);
+    const double residual = (drained - b * std::log1p(s)) / (b * d) - target;
+    const double inverse = 1.0 / ((1.0 + b * s) * (1.0 + s));
+    const double slope = s * inverse;
+    const double curvature = (1.0 - b * s * s) * inverse * inverse;
+    const double step = residual * slope / (slope * slope - 0.5 * residual * curvature);
+    ++*iterations;
+    // log1p(b (s - step)) by its series about s: x is below 1e-2 after the series start.
+    const double x = b * step / (1.0 + b * s);
+    exponent = drained - x * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * (0.2 + x / 6.0)))));
+    s -= step;
+    if (std::abs(step) < kStepDone * s) break;
+  }
+  return exponent;
+}
+
+/// The same everywhere, edges included. Slower: most of the domain is solve_inside's.
+double solve_at_edge(double target, double b, double d, double exponent_max, int* iterations) noexcept {
   const double bound =
       b * target - b * std::log(b) / d;  // v T_r if the current decayed completely, from above
   constexpr double kDecayed = 45.0;      // exp(-45) is below one ulp
@@ -100,7 +121,9 @@ double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept {
   return DriveCoastCommand(T_r, u).mean_current(omega_r);
 }
 
-DriveCoastSolution drive_coast_invert(double T_r, double omega_r, double i_over_is) noexcept {
+DriveCoastInverse::DriveCoastInverse(double T_r) noexcept : T_r_(T_r), full_decay_(-std::expm1(-T_r)) {}
+
+DriveCoastSolution DriveCoastInverse::solve(double omega_r, double i_over_is) const noexcept {
   if (i_over_is == 0.0) return {};
   const double sign = i_over_is < 0.0 ? -1.0 : 1.0;
   const double g = std::abs(i_over_is);
@@ -108,14 +131,33 @@ DriveCoastSolution drive_coast_invert(double T_r, double omega_r, double i_over_
   const double b = 0.5 * (1.0 + w);
   const double d = 0.5 * (1.0 - w);
   const double v_continuous = 0.5 * (g + 1.0 + w);  // (4.29)
-  if (!(v_continuous < boundary_duty(T_r, b, d))) {
+  // (4.27) without its logarithm, as in DriveCoastCommand.
+  const bool discontinuous =
+      T_r_ > 0.0 ? std::expm1((v_continuous - 1.0) * T_r_) < -d * full_decay_ : v_continuous < b;
+  if (!discontinuous) {
     if (v_continuous > 1.0) return {sign, 0, false};
     return {sign * v_continuous, 0, true};
   }
   DriveCoastSolution solution;
-  const double target = g * T_r / (2.0 * b * d);
-  solution.u = sign * std::min(solve_exponent(target, b, d, T_r, &solution.iterations) / T_r, 1.0);
+  const double target = g * T_r_ / (2.0 * b * d);
+  const double r = std::sqrt(2.0 * target);
+  constexpr double kEdge = 0.02;
+  constexpr double kSmallest = 1e-4;  // below it the difference of the logarithms loses digits
+  constexpr double kLargest = 1.2;    // above it the series start is poor
+  constexpr double kLinear = 1e-20;   // the series' first term is exact; its square may not be representable
+  if (r < kLinear) {
+    solution.u = sign * std::min(b * r / T_r_, 1.0);
+    return solution;
+  }
+  const bool inside = b > kEdge && d > kEdge && r > kSmallest && r < kLargest;
+  const double exponent = inside ? solve_inside(target, r, b, d, &solution.iterations)
+                                 : solve_at_edge(target, b, d, T_r_, &solution.iterations);
+  solution.u = sign * std::min(exponent / T_r_, 1.0);
   return solution;
+}
+
+DriveCoastSolution drive_coast_invert(double T_r, double omega_r, double i_over_is) noexcept {
+  return DriveCoastInverse(T_r).solve(omega_r, i_over_is);
 }
 
 }  // namespace equipoise

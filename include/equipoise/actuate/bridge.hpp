@@ -31,7 +31,7 @@ struct MotorParameters {
 
 class Bridge {
  public:
-  explicit Bridge(const MotorParameters& motor) : motor_(motor), T_r_(motor.T_r()) {}
+  explicit Bridge(const MotorParameters& motor) : motor_(motor), inverse_(motor.T_r()) {}
 
   /// A battery reading outside this range is not believed and the nominal voltage taken instead.
   static constexpr double kMinShareOfNominal = 0.5;
@@ -49,14 +49,14 @@ class Bridge {
     if (motor_.bridge == BridgeType::kDriveBrake || !motor_.invert_bridge) return saturate(scaled);
     const double omega_r = wheel_rate_rad_s / motor_.no_load_rad_s(supply);
     if (!std::isfinite(scaled - omega_r)) return scaled - omega_r;  // for the safety gate to see
-    return drive_coast_invert(T_r_, std::clamp(omega_r, -1.0, 1.0), scaled - omega_r).u;
+    return inverse_.solve(std::clamp(omega_r, -1.0, 1.0), scaled - omega_r).u;
   }
 
   static double saturate(double u) noexcept { return u > 1.0 ? 1.0 : (u < -1.0 ? -1.0 : u); }
 
  private:
   MotorParameters motor_;
-  double T_r_;
+  DriveCoastInverse inverse_;
 };
 
 }  // namespace equipoise

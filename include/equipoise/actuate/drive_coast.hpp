@@ -34,7 +34,16 @@ struct DriveCoastSolution {
 };
 inline constexpr int kDriveCoastMaxIterations = 4;
 
-/// The command whose mean current is `i_over_is`. [T] section 4.4.
+/// The command whose mean current is `i_over_is`, [T] section 4.4; for one motor, whose T_r does not change.
+class DriveCoastInverse {
+ public:
+  explicit DriveCoastInverse(double T_r) noexcept;
+  DriveCoastSolution solve(double omega_r, double i_over_is) const noexcept;
+
+ private:
+  double T_r_;
+  double full_decay_;  // 1 - exp(-T_r)
+};
 DriveCoastSolution drive_coast_invert(double T_r, double omega_r, double i_over_is) noexcept;
 
 }  // namespace equipoise

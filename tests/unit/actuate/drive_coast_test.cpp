@@ -67,7 +67,7 @@ TEST(DriveCoast, RoundTripsThroughForwardModelBothSignsAndAllEdges) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   int most = 0;
   for (int k = 0; k < 300000; ++k) {
-    const double T_r = std::pow(10.0, -4.0 + 7.0 * unit(random));
+    const double T_r = std::pow(10.0, -12.0 + 15.0 * unit(random));
     const double pick = unit(random);
     const double edge = std::pow(10.0, -9.0 + 8.0 * unit(random));
     const double w = pick < 0.5 ? 2.0 * unit(random) - 1.0 : (pick < 0.75 ? 1.0 - edge : edge - 1.0);
@@ -87,6 +87,36 @@ TEST(DriveCoast, RoundTripsThroughForwardModelBothSignsAndAllEdges) {
     }
   }
   EXPECT_LE(most, kDriveCoastMaxIterations - 1) << "the iteration bound is never reached";
+}
+
+TEST(DriveCoast, NeverGivesNaNForTheSmallestTargets) {
+  for (const double T_r : {1e-12, 1e-6, 0.289, 10.0, 1e6}) {
+    const DriveCoastInverse inverse(T_r);
+    for (const double w : {-1.0, -0.999999, -0.9, 0.0, 0.9, 0.999999, 1.0}) {
+      for (double target = 1.0; target > 0.0; target *= 1e-3) {
+        const double u = inverse.solve(w, target).u;
+        ASSERT_TRUE(u >= 0.0 && u <= 1.0) << T_r << " " << w << " " << target;
+        ASSERT_EQ(inverse.solve(-w, -target).u, -u);
+      }
+    }
+  }
+}
+
+TEST(DriveCoast, MostTargetsOfTheRobotNeedOneStep) {
+  const DriveCoastInverse inverse(MotorParameters().T_r());
+  int steps = 0;
+  int solved = 0;
+  for (double w = -0.9; w <= 0.9; w += 0.01) {
+    for (double v = 0.005; v < 1.0; v += 0.005) {
+      const DriveCoastSolution solution =
+          inverse.solve(w, drive_coast_mean_current(MotorParameters().T_r(), w, v));
+      ASSERT_LE(solution.iterations, 2);
+      ASSERT_NEAR(solution.u, v, 1e-9);
+      steps += solution.iterations;
+      solved += solution.iterations > 0 ? 1 : 0;
+    }
+  }
+  EXPECT_LT(steps, 1.2 * solved);
 }
 
 TEST(DriveCoast, LimitsOfVeryHighAndVeryLowPwmFrequency) {
