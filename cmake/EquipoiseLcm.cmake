@@ -9,10 +9,9 @@ add_custom_command(
   OUTPUT ${lcm_stamp}
   BYPRODUCTS ${lcm_headers}
   COMMAND ${LCM_GEN} --cpp --cpp-hpath ${lcm_out}/cpp ${lcm_files}
-  COMMAND ${CMAKE_COMMAND} -D DIRECTORY=${lcm_out}/cpp/equipoise -P ${CMAKE_CURRENT_LIST_DIR}/RefuseShortStrings.cmake
   COMMAND ${LCM_GEN} --python --ppath ${lcm_out}/python ${lcm_files}
   COMMAND ${CMAKE_COMMAND} -E touch ${lcm_stamp}
-  DEPENDS ${lcm_files} ${CMAKE_CURRENT_LIST_DIR}/RefuseShortStrings.cmake
+  DEPENDS ${lcm_files}
   COMMENT "Generating LCM types")
 add_custom_target(equipoise_lcm_generate DEPENDS ${lcm_stamp})
 add_library(equipoise_lcm_types INTERFACE)

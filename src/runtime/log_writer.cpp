@@ -1,136 +1,194 @@
 #include "log_writer.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
+
+#include "equipoise/runtime/log_parts.hpp"
 
 namespace equipoise::runtime {
 namespace {
 
-constexpr std::int64_t kEventHeaderBytes = 28;  // sync, event number, time stamp, two lengths
+constexpr std::uint32_t kSync = 0xEDA1DA01U;
 constexpr auto kRoomCheckPeriod = std::chrono::seconds(1);
+constexpr auto kSyncPeriod = std::chrono::milliseconds(50);
+
+template <class Unsigned>
+void put(Unsigned value, std::vector<std::uint8_t>* out) {
+  for (std::size_t i = sizeof value; i-- > 0;) out->push_back(static_cast<std::uint8_t>(value >> (8U * i)));
+}
+
+/// 0, or errno: EWOULDBLOCK where another process writes it, for which it holds a lock.
+int end_of_writing(const std::string& part, std::int64_t* time_s) {
+  const int fd = open(part.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return errno;
+  struct stat status {};
+  const int error = fstat(fd, &status) == 0 && flock(fd, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
+  close(fd);
+  *time_s = status.st_mtim.tv_sec;
+  return error;
+}
+
+/// The earlier log of this name gets out of the way. 0, or errno.
+int clear_name(const std::string& path, bool keep) {
+  const std::vector<std::string> parts = existing_log_parts(path);
+  std::int64_t ended_s = 0;
+  for (const std::string& part : parts) {
+    if (const int error = end_of_writing(part, &ended_s)) return error;
+  }
+  const std::string kept = kept_name(path, ended_s);
+  for (const std::string& part : parts) {
+    const int error = keep ? rename(part.c_str(), log_part(kept, log_part_number(path, part)).c_str())
+                           : unlink(part.c_str());
+    if (error != 0) return errno;
+  }
+  return 0;
+}
+
+bool is_regular_or_absent(const std::string& path) {
+  std::error_code error;
+  const auto type = std::filesystem::status(path, error).type();
+  return type == std::filesystem::file_type::regular || type == std::filesystem::file_type::not_found;
+}
 
 }  // namespace
 
-std::string LogWriter::part(const std::string& path, int number) {
-  if (number == 0) return path;
-  const std::filesystem::path p(path);
-  char middle[16];
-  std::snprintf(middle, sizeof middle, ".%04d", number);
-  return (p.parent_path() / (p.stem().string() + middle + p.extension().string())).string();
+bool LogWriter::create(const std::string& path) {
+  const int flags = O_WRONLY | O_CREAT | O_CLOEXEC | (is_regular_or_absent(path) ? O_EXCL : 0);
+  const int fd = ::open(path.c_str(), flags, 0644);
+  if (fd < 0 || ((flags & O_EXCL) != 0 && flock(fd, LOCK_EX | LOCK_NB) != 0)) {
+    error_ = path + ": log cannot be created: " + std::strerror(errno);
+    if (fd >= 0) ::close(fd);
+    return false;
+  }
+  fd_ = fd;
+  file_bytes_ = 0;
+  sync_fd_.store(fd, std::memory_order_relaxed);
+  return true;
 }
 
 bool LogWriter::open(const std::string& path, const LogLimits& limits) {
   path_ = path;
   limits_ = limits;
-  // Parts of an earlier run must not pass for this one's.
-  std::error_code ignored;
-  for (int i = 1; std::filesystem::remove(part(path, i), ignored); ++i) {
+  if (is_regular_or_absent(path) && !existing_log_parts(path).empty()) {
+    const int error = clear_name(path, limits.keep_previous);
+    if (error != 0) {
+      error_ = path + ": log cannot be created: " +
+               (error == EWOULDBLOCK ? "another process is writing it" : std::strerror(error));
+      return false;
+    }
   }
-  log_ = lcm_eventlog_create(path.c_str(), "w");
-  return log_ != nullptr;
+  if (!create(path)) return false;
+  if (limits_.sync) syncer_ = std::thread([this] { sync_periodically(); });
+  return true;
 }
 
-void LogWriter::preamble(std::int64_t utime, const std::string& channel,
+void LogWriter::preamble(std::int64_t utime, std::string_view channel,
                          const std::vector<std::uint8_t>& data) {
   preamble_utime_ = utime;
   preamble_channel_ = channel;
   preamble_ = data;
-  write(utime, preamble_channel_.c_str(), preamble_.data(), static_cast<int>(preamble_.size()));
-  tick_bytes_ = file_bytes_;
-  flush();
+  event(utime, channel, data);
+  write_out();
 }
 
-void LogWriter::write(std::int64_t utime, const char* channel, std::uint8_t* data, int size) {
+void LogWriter::event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data) {
   if (!is_open()) return;
-  lcm_eventlog_event_t event{};
-  event.eventnum = event_number_++;
-  event.timestamp = utime;
-  event.channellen = static_cast<std::int32_t>(std::strlen(channel));
-  event.datalen = size;
-  event.channel = const_cast<char*>(channel);
-  event.data = data;
-  errno = 0;
-  if (lcm_eventlog_write_event(log_, &event) != 0) {
-    fail(errno);
-    return;
-  }
-  file_bytes_ += kEventHeaderBytes + event.channellen + size;
+  put(kSync, &tick_);
+  put(static_cast<std::uint64_t>(event_number_++), &tick_);
+  put(static_cast<std::uint64_t>(utime), &tick_);
+  put(static_cast<std::uint32_t>(channel.size()), &tick_);
+  put(static_cast<std::uint32_t>(data.size()), &tick_);
+  tick_.insert(tick_.end(), channel.begin(), channel.end());
+  tick_.insert(tick_.end(), data.begin(), data.end());
 }
 
 void LogWriter::end_tick() {
+  write_out();
+  if (const int error = sync_error_.load(std::memory_order_relaxed)) fail(error);
   if (!is_open()) return;
-  tick_bytes_ = file_bytes_;
-  if (++pending_ticks_ >= kFlushTicks) flush();
   if (limits_.max_bytes > 0 && file_bytes_ >= limits_.max_bytes) next_file();
   if (limits_.min_free_bytes > 0) make_room();
 }
 
-void LogWriter::flush() {
-  if (!is_open() || whole_bytes_ == file_bytes_) return;
-  errno = 0;
-  if (std::fflush(log_->f) != 0 || (limits_.sync && fdatasync(fileno(log_->f)) != 0)) {
-    fail(errno);
-    return;
+void LogWriter::write_out() {
+  std::size_t done = 0;
+  while (is_open() && done < tick_.size()) {
+    const ssize_t written = ::write(fd_, tick_.data() + done, tick_.size() - done);
+    if (written > 0) {
+      done += static_cast<std::size_t>(written);
+    } else if (written == 0 || errno != EINTR) {
+      fail(written == 0 ? ENOSPC : errno);
+      if (done > 0 && ftruncate(fd_, static_cast<off_t>(file_bytes_)) != 0)
+        error_ += "; its last event is torn";
+    }
   }
-  whole_bytes_ = tick_bytes_;
-  pending_ticks_ = 0;
+  if (is_open()) file_bytes_ += static_cast<std::int64_t>(done);
+  tick_.clear();
 }
 
 void LogWriter::fail(int error) {
-  if (error_.empty()) error_ = path_ + ": log stopped: " + std::strerror(error != 0 ? error : EIO);
+  if (error_.empty()) error_ = path_ + ": log stopped: " + std::strerror(error);
 }
 
-/// A log on a full disk is cut back to its last whole tick.
 void LogWriter::close() {
-  if (log_ == nullptr) return;
-  flush();
-  if (error_.empty()) {
-    lcm_eventlog_destroy(log_);
-  } else {
-    // What the buffer could not write must not be appended after the cut.
-    const int fd = dup(fileno(log_->f));
-    lcm_eventlog_destroy(log_);
-    if (fd >= 0) {
-      if (ftruncate(fd, static_cast<off_t>(whole_bytes_)) != 0) error_ += "; its last event is torn";
-      ::close(fd);
-    }
+  if (syncer_.joinable()) {
+    sync_stop_.store(true, std::memory_order_relaxed);
+    syncer_.join();
   }
-  log_ = nullptr;
+  if (fd_ < 0) return;
+  write_out();
+  if (limits_.sync && fdatasync(fd_) != 0) fail(errno);
+  ::close(fd_);
+  fd_ = -1;
+}
+
+/// fdatasync may take longer than a tick; here nobody waits for it.
+void LogWriter::sync_periodically() {
+  while (!sync_stop_.load(std::memory_order_relaxed)) {
+    if (fdatasync(sync_fd_.load(std::memory_order_relaxed)) != 0 && errno != EBADF)  // EBADF: just rotated
+      sync_error_.store(errno, std::memory_order_relaxed);
+    std::this_thread::sleep_for(kSyncPeriod);
+  }
 }
 
 void LogWriter::next_file() {
-  flush();
-  if (!is_open()) return;
-  lcm_eventlog_destroy(log_);
-  log_ = lcm_eventlog_create(part(path_, ++part_).c_str(), "w");
-  if (log_ == nullptr) {
-    fail(errno);
-    return;
-  }
-  file_bytes_ = tick_bytes_ = whole_bytes_ = 0;
+  const int previous = fd_;
+  if (!create(log_part(path_, ++part_))) return;
+  if (limits_.sync) (void)fdatasync(previous);
+  ::close(previous);
   preamble(preamble_utime_, preamble_channel_, std::vector<std::uint8_t>(preamble_));
 }
 
+/// Earlier logs of this name go first, then this run's own oldest files.
 void LogWriter::make_room() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_room_check_) return;
   next_room_check_ = now + kRoomCheckPeriod;
+  std::vector<std::string> kept;
+  bool looked = false;
   struct statvfs disk {};
-  while (fstatvfs(fileno(log_->f), &disk) == 0 &&
+  while (fstatvfs(fd_, &disk) == 0 &&
          static_cast<std::int64_t>(disk.f_bavail) * static_cast<std::int64_t>(disk.f_frsize) <
              limits_.min_free_bytes) {
-    if (oldest_part_ == part_) {
-      flush();
+    if (!looked) kept = kept_logs(path_);
+    looked = true;
+    std::error_code ignored;
+    if (!kept.empty()) {
+      std::filesystem::remove(kept.front(), ignored);
+      kept.erase(kept.begin());
+    } else if (oldest_part_ == part_) {
       fail(ENOSPC);
       return;
+    } else {
+      std::filesystem::remove(log_part(path_, oldest_part_++), ignored);
     }
-    std::error_code ignored;
-    std::filesystem::remove(part(path_, oldest_part_++), ignored);
   }
 }
 

@@ -1,14 +1,16 @@
-// An LCM event log that survives: whole ticks, written through every few of them, cut back to its last whole
-// tick when the disk is full, continued in a further file when it is large, oldest files deleted when space
-// is short. In: events -> out: NAME.lcm, NAME.0001.lcm, ...; each starts with the preamble. Telemetry thread
-// only.
+// An LCM event log that survives: a whole tick per write, cut back to its last whole tick when the disk is
+// full, continued in a further file when it is large, oldest files deleted when space is short. A log that
+// another process is writing is left alone.
+// In: events -> out: NAME.lcm, NAME.0001.lcm, ...; each starts with the preamble. What write() took survives
+// SIGKILL; a thread of its own brings it to the disk for a power cut. Telemetry thread only.
 #pragma once
 
-#include <lcm/eventlog.h>
-
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <thread>
 #include <vector>
 
 namespace equipoise::runtime {
@@ -17,6 +19,7 @@ struct LogLimits {
   std::int64_t max_bytes = 0;       // of one file; 0: no limit
   std::int64_t min_free_bytes = 0;  // on its file system
   bool sync = false;                // to the disk, not only to the kernel
+  bool keep_previous = false;       // a log of the same name is moved aside rather than replaced
 };
 
 class LogWriter {
@@ -26,43 +29,43 @@ class LogWriter {
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
 
-  /// False with errno set when the file cannot be created.
+  /// False when the file cannot be created; error() says why.
   bool open(const std::string& path, const LogLimits& limits);
-  bool is_open() const { return log_ != nullptr && error_.empty(); }
+  bool is_open() const { return fd_ >= 0 && error_.empty(); }
   const std::string& error() const { return error_; }
 
   /// Repeated at the start of every further file.
-  void preamble(std::int64_t utime, const std::string& channel, const std::vector<std::uint8_t>& data);
-  void write(std::int64_t utime, const char* channel, std::uint8_t* data, int size);
+  void preamble(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data);
+  void event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data);
+  /// The tick's events go to the kernel, all or none.
   void end_tick();
-  void flush();
   void close();
-
-  /// NAME.lcm, 3 -> NAME.0003.lcm; 0 is NAME.lcm itself.
-  static std::string part(const std::string& path, int number);
 
  private:
   void fail(int error);
+  bool create(const std::string& path);
+  void write_out();
   void make_room();
   void next_file();
-
-  static constexpr int kFlushTicks = 4;  // 20 ms
+  void sync_periodically();
 
   std::string path_;
   LogLimits limits_;
-  lcm_eventlog_t* log_ = nullptr;
+  int fd_ = -1;
   std::string error_;
   std::string preamble_channel_;
   std::vector<std::uint8_t> preamble_;
   std::int64_t preamble_utime_ = 0;
+  std::vector<std::uint8_t> tick_;  // its events
   int part_ = 0;
   int oldest_part_ = 0;
   std::int64_t event_number_ = 0;
-  std::int64_t file_bytes_ = 0;   // handed to the file
-  std::int64_t tick_bytes_ = 0;   // of them, up to the last whole tick
-  std::int64_t whole_bytes_ = 0;  // of them, known to be in the kernel
-  int pending_ticks_ = 0;
+  std::int64_t file_bytes_ = 0;  // whole ticks, in the kernel
   std::chrono::steady_clock::time_point next_room_check_{};
+  std::thread syncer_;
+  std::atomic<int> sync_fd_{-1};
+  std::atomic<int> sync_error_{0};
+  std::atomic<bool> sync_stop_{false};
 };
 
 }  // namespace equipoise::runtime

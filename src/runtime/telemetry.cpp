@@ -2,22 +2,12 @@
 
 #include <lcm/lcm.h>
 
-#include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
-#include <equipoise/command_t.hpp>
-#include <equipoise/health_t.hpp>
-#include <equipoise/motors_t.hpp>
-#include <equipoise/run_t.hpp>
-#include <equipoise/sensors_t.hpp>
-#include <equipoise/state_t.hpp>
-#include <equipoise/timing_histogram_t.hpp>
-#include <equipoise/timing_t.hpp>
 #include <stdexcept>
 
 #include "equipoise/runtime/timing.hpp"
+#include "equipoise/runtime/wire.hpp"
 #include "log_writer.hpp"
 
 namespace equipoise::runtime {
@@ -25,22 +15,6 @@ namespace {
 
 constexpr std::size_t kQueueTicks = 1024;  // five seconds at 200 Hz
 constexpr auto kIdle = std::chrono::milliseconds(2);
-
-template <class Array, class T, std::size_t N>
-void copy(const Array& from, T (&to)[N]) {
-  std::copy(std::begin(from), std::end(from), to);
-}
-
-state_t to_message(const StateRecord& s) {
-  state_t m{};
-  copy(s.theta_rad, m.theta_rad);
-  copy(s.omega_B_rad_s, m.omega_B_rad_s);
-  copy(s.phi_rad, m.phi_rad);
-  copy(s.phi_dot_rad_s, m.phi_dot_rad_s);
-  copy(s.position_W_m, m.position_W_m);
-  m.normalized_innovation = s.normalized_innovation;
-  return m;
-}
 
 std::string upper(std::string text) {
   for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
@@ -54,10 +28,10 @@ class Telemetry::Writer {
  public:
   Writer(const TelemetryOptions& options, TelemetryReport* report, std::atomic<bool>* log_failed)
       : options_(options), report_(report), log_failed_(log_failed) {
-    const LogLimits limits{options.max_log_bytes, options.min_free_bytes, options.sync};
-    if (!options.log_path.empty() && !log_.open(options.log_path, limits)) {
-      throw std::runtime_error(options.log_path + ": log cannot be created: " + std::strerror(errno));
-    }
+    const LogLimits limits{options.max_log_bytes, options.min_free_bytes, options.sync,
+                           options.keep_previous};
+    if (!options.log_path.empty() && !log_.open(options.log_path, limits))
+      throw std::runtime_error(log_.error());
     if (!options.url.empty()) {
       lcm_ = lcm_create(options.url.c_str());
       report_->publishing = lcm_ != nullptr;
@@ -68,7 +42,8 @@ class Telemetry::Writer {
             "going on without it";
       }
     }
-    for (const std::string& name : options.estimators) channels_.push_back("EQUIPOISE_STATE_" + upper(name));
+    for (const std::string& name : options.estimators)
+      channels_.push_back(std::string(fields::kComparedChannel) + upper(name));
     announce(options.run);
   }
 
@@ -88,26 +63,16 @@ class Telemetry::Writer {
     }
     utime_ = r.now_ns / 1000;
     tick_ = r.tick;
-    sensors(r);
-    command(r);
-    state("EQUIPOISE_STATE", r.estimate);
+    fields::each_message(
+        r, [this](auto message, const char* channel, const auto& record) { emit(message, channel, record); });
     for (std::size_t i = 0; i < channels_.size() && i < kMaxEstimators; ++i) {
-      if ((r.compared & (1U << i)) != 0) state(channels_[i].c_str(), r.others[i]);
+      if ((r.compared & (1U << i)) != 0) emit(fields::State{}, channels_[i].c_str(), r.others[i]);
     }
-    state("EQUIPOISE_REFERENCE", r.reference);
-    if (r.has_truth) state("EQUIPOISE_TRUTH", r.truth);
-    motors(r);
-    health(r);
-    timing(r);
+    if (r.has_truth) emit(fields::State{}, fields::kTruthChannel, r.truth);
+    if (r.compute_ns > 0) histogram(r);  // simulated time takes no time
     log_.end_tick();
     note_failure();
     ++report_->records;
-  }
-
-  /// Nothing to do: what is written so far goes to the kernel.
-  void idle() {
-    log_.flush();
-    note_failure();
   }
 
   void close_log() {
@@ -116,20 +81,15 @@ class Telemetry::Writer {
   }
 
  private:
-  template <class Message>
-  void encode(const Message& message) {
-    const int size = message.getEncodedSize();
-    buffer_.resize(static_cast<std::size_t>(size));
-    message.encode(buffer_.data(), 0, size);
+  template <class Message, class Record>
+  void emit(Message message, const char* channel, const Record& record) {
+    encode(message, record, utime_, tick_, &buffer_);
+    log_.event(utime_, channel, buffer_);
+    if (publish_now_) publish(channel);
   }
 
-  template <class Message>
-  void emit(const char* channel, Message& message) {
-    message.utime = utime_;
-    message.tick = tick_;
-    encode(message);
-    log_.write(utime_, channel, buffer_.data(), static_cast<int>(buffer_.size()));
-    if (publish_now_) lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned>(buffer_.size()));
+  void publish(const char* channel) {
+    lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned>(buffer_.size()));
   }
 
   void note_failure() {
@@ -139,82 +99,9 @@ class Telemetry::Writer {
   }
 
   void announce(const RunInfo& run) {
-    run_t m{};
-    m.seed = run.seed;
-    m.rolling_radius_m = run.rolling_radius_m;
-    m.robot = run.robot;
-    m.estimator = run.estimator;
-    m.controller = run.controller;
-    m.fidelity = run.fidelity;
-    m.version = run.version;
-    m.config_sha256 = run.config_sha256;
-    m.config_toml = run.config_toml;
-    m.backend = run.backend;
-    m.board_toml = run.board_toml;
-    m.attitude = run.attitude;
-    encode(m);
-    log_.preamble(utime_, "EQUIPOISE_RUN", buffer_);
-    if (lcm_ != nullptr)
-      lcm_publish(lcm_, "EQUIPOISE_RUN", buffer_.data(), static_cast<unsigned>(buffer_.size()));
-  }
-
-  void sensors(const TickRecord& r) {
-    sensors_t m{};
-    m.t_ns = r.raw.t_ns;
-    copy(r.raw.gyro_counts, m.gyro_counts);
-    copy(r.raw.accel_counts, m.accel_counts);
-    copy(r.raw.encoder_counts, m.encoder_counts);
-    copy(r.raw.attitude_wxyz, m.attitude_wxyz);
-    m.battery_counts = r.raw.battery_counts;
-    m.valid = static_cast<std::int32_t>(r.raw.valid);
-    m.health = static_cast<std::int32_t>(r.raw.health);
-    emit("EQUIPOISE_SENSORS", m);
-  }
-
-  void command(const TickRecord& r) {
-    command_t m{};
-    copy(r.velocity_W_m_s, m.velocity_W_m_s);
-    m.yaw_rate_rad_s = r.yaw_rate_rad_s;
-    m.arm = r.arm ? 1 : 0;
-    m.heading_reset = r.heading_reset ? 1 : 0;
-    m.age_s = r.command_age_s;
-    emit("EQUIPOISE_COMMAND", m);
-  }
-
-  void state(const char* channel, const StateRecord& s) {
-    state_t m = to_message(s);
-    emit(channel, m);
-  }
-
-  void motors(const TickRecord& r) {
-    motors_t m{};
-    m.motors = kMaxMotors;
-    copy(r.u_lin, m.u_lin);
-    copy(r.u_friction, m.u_friction);
-    copy(r.duty, m.duty);
-    m.enable = r.enable ? 1 : 0;
-    m.saturated = r.saturated ? 1 : 0;
-    emit("EQUIPOISE_MOTORS", m);
-  }
-
-  void health(const TickRecord& r) {
-    health_t m{};
-    m.arm_state = r.arm_state;
-    m.reasons = static_cast<std::int32_t>(r.reasons);
-    m.sensor_health = static_cast<std::int32_t>(r.raw.health);
-    m.battery_V = r.battery_V;
-    m.inhibit = static_cast<std::int32_t>(r.inhibit);
-    emit("EQUIPOISE_HEALTH", m);
-  }
-
-  void timing(const TickRecord& r) {
-    timing_t m{};
-    m.wake_late_ns = r.wake_late_ns;
-    m.compute_ns = r.compute_ns;
-    m.overruns = r.overruns;
-    m.dropped_records = r.dropped_records;
-    emit("EQUIPOISE_TIMING", m);
-    if (r.compute_ns > 0) histogram(r);  // simulated time takes no time
+    encode(fields::Run{}, run, utime_, tick_, &buffer_);
+    log_.preamble(utime_, fields::kRunChannel, buffer_);
+    if (lcm_ != nullptr) publish(fields::kRunChannel);
   }
 
   /// Once a second of ticks.
@@ -222,12 +109,10 @@ class Telemetry::Writer {
     wake_late_.add(r.wake_late_ns);
     compute_.add(r.compute_ns);
     if (wake_late_.total() % static_cast<std::int64_t>(kTickHz) != 0) return;
-    timing_histogram_t m{};
-    for (std::size_t i = 0; i < TimeHistogram::kBins; ++i) m.upper_ns[i] = TimeHistogram::upper_ns(i);
-    copy(wake_late_.bins(), m.wake_late);
-    copy(compute_.bins(), m.compute);
+    fields::HistogramRecord record{{}, wake_late_.bins(), compute_.bins()};
+    for (std::size_t i = 0; i < TimeHistogram::kBins; ++i) record.upper_ns[i] = TimeHistogram::upper_ns(i);
     publish_now_ = lcm_ != nullptr;
-    emit("EQUIPOISE_TIMING_HISTOGRAM", m);
+    emit(fields::Histogram{}, fields::kHistogramChannel, record);
   }
 
   const TelemetryOptions& options_;
@@ -236,7 +121,7 @@ class Telemetry::Writer {
   LogWriter log_;
   lcm_t* lcm_ = nullptr;
   std::vector<std::string> channels_;
-  std::vector<std::uint8_t> buffer_;
+  Bytes buffer_;
   std::chrono::steady_clock::time_point next_publish_{};
   bool publish_now_ = false;
   std::int64_t utime_ = 0;
@@ -273,10 +158,7 @@ void Telemetry::run() {
       any = true;
     }
     if (stopping) break;
-    if (!any) {
-      writer_->idle();
-      std::this_thread::sleep_for(kIdle);
-    }
+    if (!any) std::this_thread::sleep_for(kIdle);
   }
   writer_->close_log();
 }

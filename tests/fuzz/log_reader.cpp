@@ -3,17 +3,17 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "app/cli/commands.hpp"
-#include "app/log/flight_log.hpp"
+#include "app/cli/errors.hpp"
+#include "app/log/run_log.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    const std::string_view bytes(reinterpret_cast<const char*>(data), size);
-    const equipoise::app::FlightLog log = equipoise::app::parse_flight_log(bytes, "fuzz.lcm");
-    if (log.damaged_bytes > size) std::abort();
-    for (const equipoise::app::LoggedTick& tick : log.ticks) {
-      if (tick.command.tick != tick.sensors.tick) std::abort();
+    const std::string bytes(reinterpret_cast<const char*>(data), size);
+    equipoise::app::RunLog log(bytes, "fuzz.lcm");
+    for (equipoise::runtime::TickRecord tick; log.next(&tick);) {
+      if (tick.compared >> log.estimators().size() != 0) std::abort();
     }
+    if (log.damaged_bytes() > size) std::abort();
   } catch (const equipoise::app::InputError&) {
   }
   return 0;

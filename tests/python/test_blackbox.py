@@ -3,6 +3,7 @@
 import csv
 import json
 import random
+import re
 import signal
 import socket
 import struct
@@ -78,7 +79,7 @@ def rewrite(log, channel, tick, change):
         name_size, size = struct.unpack_from(">II", data, at + 20)
         body = at + 28 + name_size
         if data[at + 28 : body] == channel.encode():
-            kind = getattr(equipoise, {"SENSORS": "sensors_t", "MOTORS": "motors_t"}[channel[10:]])
+            kind = getattr(equipoise, channel[10:].lower() + "_t")
             message = kind.decode(bytes(data[body : body + size]))
             if message.tick == tick:
                 change(message)
@@ -226,46 +227,150 @@ def test_a_large_log_goes_on_in_further_files_and_replays_as_one(root, tmp_path)
     assert all(read_log(part)["EQUIPOISE_RUN"][0].robot == "mbbr" for part in parts)
     status, result = replay(root, tmp_path / "run.lcm")
     assert status == 0 and result["ticks"] == 2000 and result["identical"]
+    whole = read_log(tmp_path / "run.lcm")
+    assert whole.notes == []
+    assert whole["EQUIPOISE_SENSORS"]["tick"].tolist() == list(range(2000))
+    for kind in ("csv", "mcap"):
+        assert "2000 ticks" in equipoise_run(root, "convert", tmp_path / "run.lcm", "--to", kind).stdout
 
 
-def test_a_short_disk_costs_the_oldest_files_then_stops_the_run(root, tmp_path):
-    process, connection = start_lockstep(root, tmp_path, "--log-min-free-mb", "1000000")
-    robot = Robot(0.0)
+def start_again(root, log, *arguments):
+    """A run that ends after five steps, in a process of its own."""
+    process, connection = start_lockstep(root, log.parent, *arguments)
     with connection:
-        last = False
-        for step in range(1000):
-            connection.send(robot.sensors(step).encode())
-            last = equipoise.lockstep_motors_t.decode(connection.recv(512)).last
-            if last:
-                break
-    assert last
-    assert process.wait(timeout=30) == 1
-    assert read_log(tmp_path / "run.lcm").notes == []
+        message = Robot(0.0).sensors(0)
+        for step in range(5):
+            message.step, message.t_s, message.last = step, 0.005 * step, step == 4
+            connection.send(message.encode())
+            connection.recv(512)
+    process.wait(timeout=30)
 
 
-def test_csv_holds_the_same_numbers(root, tmp_path):
-    log = simulate(root, tmp_path / "run.lcm", seconds=2)
-    assert equipoise_run(root, "convert", log, "--to", "csv").returncode == 0
-    rows = list(csv.DictReader((tmp_path / "run.csv").open()))
-    state = read_log(log)["EQUIPOISE_STATE"]
-    motors = read_log(log)["EQUIPOISE_MOTORS"]
-    assert [int(row["tick"]) for row in rows] == state["tick"].tolist()
-    assert [float(row["state.theta_rad_1"]) for row in rows] == state["theta_rad"][:, 1].tolist()
-    assert [float(row["motors.duty_2"]) for row in rows] == motors["duty"][:, 2].tolist()
+def test_a_new_start_keeps_the_last_log(root, tmp_path):
+    log = tmp_path / "run.lcm"
+    start_again(root, log)
+    first = log.read_bytes()
+    (tmp_path / "run.0001.lcm").write_bytes(first)  # as if it had been rotated
+    start_again(root, log)
+    kept = sorted(path.name for path in tmp_path.glob("run.*Z*.lcm"))
+    assert len(kept) == 2 and all(re.fullmatch(r"run\.\d{8}T\d{6}Z(\.0001)?\.lcm", name) for name in kept)
+    assert [(tmp_path / name).read_bytes() for name in kept] == [first, first]
+    assert len(read_log(log)["EQUIPOISE_SENSORS"]) == 5  # not what was kept
 
 
-def test_mcap_holds_the_same_numbers(root, tmp_path):
-    log = simulate(root, tmp_path / "run.lcm", seconds=2)
-    assert equipoise_run(root, "convert", log, "--to", "mcap").returncode == 0
-    with (tmp_path / "run.mcap").open("rb") as stream:
-        messages = list(mcap.reader.NonSeekingReader(stream).iter_messages(topics=["equipoise/state"]))
-    state = read_log(log)["EQUIPOISE_STATE"]
-    assert len(messages) == len(state)
-    for i in (0, 200, len(state) - 1):
-        schema, channel, message = messages[i]
-        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
-        assert message.log_time == 1000 * int(state["utime"][i])
-        assert json.loads(message.data)["theta_rad_0"] == state["theta_rad"][i, 0]
+def test_a_log_that_is_being_written_is_not_taken(root, tmp_path):
+    process, connection = start_lockstep(root, tmp_path)
+    with connection:
+        message = Robot(0.0).sensors(0)
+        connection.send(message.encode())
+        connection.recv(512)
+        ended = equipoise_run(
+            root, "sim", "--config", root / "config/mbbr.toml", "--log", tmp_path / "run.lcm"
+        )
+        assert ended.returncode != 0
+        assert "another process is writing it" in ended.stderr
+    process.wait(timeout=30)
+    assert len(read_log(tmp_path / "run.lcm")["EQUIPOISE_SENSORS"]) == 1
+
+
+def test_without_a_log_nothing_is_written(root, tmp_path):
+    command = [root / "build/host/equipoise", "sim", "--config", root / "config/mbbr.toml", "--log", "off"]
+    ended = subprocess.run(
+        [*map(str, command), "--duration-s", "2", "--telemetry", "off"], cwd=tmp_path, capture_output=True
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def flat(channel, records):
+    """Column -> values, as convert names them."""
+    for field in records.dtype.names:
+        if field in ("utime", "tick"):
+            continue
+        values = records[field]
+        if values.ndim == 1:
+            yield f"{channel}.{field}", values
+        else:
+            yield from ((f"{channel}.{field}_{i}", column) for i, column in enumerate(values.T))
+
+
+@pytest.fixture(scope="module")
+def compared_log(root, tmp_path_factory):
+    """Of a run with every estimator; its loop's times are made up, for simulated time takes none."""
+    log = simulate(root, tmp_path_factory.mktemp("compared") / "run.lcm", "--compare", seconds=2)
+
+    def times(message):
+        message.wake_late_ns, message.compute_ns, message.overruns = 1234567890123, 4321, 7
+
+    for tick in (0, 57, 399):
+        rewrite(log, "EQUIPOISE_TIMING", tick, times)
+    return log
+
+
+def columns_of(log):
+    columns = {}
+    for channel, records in read_log(log).items():
+        if records.dtype.names and channel != "EQUIPOISE_TIMING_HISTOGRAM":
+            columns |= dict(flat(channel.removeprefix("EQUIPOISE_").lower(), records))
+    return columns
+
+
+def test_csv_holds_every_number_of_the_log(root, tmp_path, compared_log):
+    out = tmp_path / "run.csv"
+    assert equipoise_run(root, "convert", compared_log, "--to", "csv", "--out", out).returncode == 0
+    rows = list(csv.DictReader(out.open()))
+    expected = columns_of(compared_log)
+    assert [int(row["tick"]) for row in rows] == list(range(400))
+    assert set(rows[0]) == {"t_s", "tick", *expected}
+    assert {"timing.compute_ns", "state_ekf13.theta_rad_0", "sensors.imu_temperature_degC"} < set(expected)
+    for column, values in expected.items():
+        assert [float(row[column]) for row in rows] == values.tolist(), column
+
+
+def test_mcap_holds_every_number_of_the_log(root, tmp_path, compared_log):
+    out = tmp_path / "run.mcap"
+    assert equipoise_run(root, "convert", compared_log, "--to", "mcap", "--out", out).returncode == 0
+    expected = columns_of(compared_log)
+    utime = read_log(compared_log)["EQUIPOISE_STATE"]["utime"].tolist()
+    found = {column: [] for column in expected}
+    with out.open("rb") as stream:
+        for schema, channel, message in mcap.reader.make_reader(stream, validate_crcs=True).iter_messages():
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            fields = json.loads(message.data)
+            assert message.log_time == 1000 * utime[fields.pop("tick")]
+            for field, value in fields.items():
+                found[f"{channel.topic.removeprefix('equipoise/')}.{field}"].append(value)
+    assert found == {column: values.tolist() for column, values in expected.items()}
+
+
+def test_mcap_can_be_sought_in(root, tmp_path, compared_log):
+    out = tmp_path / "run.mcap"
+    equipoise_run(root, "convert", compared_log, "--to", "mcap", "--out", out)
+    log = read_log(compared_log)
+    utime = log["EQUIPOISE_STATE"]["utime"].tolist()
+    with out.open("rb") as stream:
+        reader = mcap.reader.make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        counts = {
+            summary.channels[number].topic: count
+            for number, count in summary.statistics.channel_message_counts.items()
+        }
+        names = {channel for channel in log if channel != "EQUIPOISE_RUN"}
+        assert counts == {
+            "equipoise/" + channel.removeprefix("EQUIPOISE_").lower(): len(log[channel]) for channel in names
+        }
+        assert summary.statistics.message_count == sum(counts.values())
+        assert summary.statistics.chunk_count == len(summary.chunk_indexes) > 1
+        assert {index.compression for index in summary.chunk_indexes} == {"zstd"}
+        assert all(len(index.message_index_offsets) > 0 for index in summary.chunk_indexes)
+        (about,) = reader.iter_metadata()
+        assert about.metadata["robot"] == "mbbr" and "[robot]" in about.metadata["config_toml"]
+        part = list(
+            reader.iter_messages(
+                ["equipoise/state"], starting_at=1000 * utime[199], ending_before=1000 * utime[219]
+            )
+        )
+    assert [json.loads(message.data)["tick"] for _, _, message in part] == list(range(199, 219))
 
 
 def test_convert_says_what_it_cannot_do(root, tmp_path):

@@ -1,6 +1,8 @@
 """read_log: all of an intact log, the intact part of a damaged one, and clear words about the rest."""
 
 import struct
+import subprocess
+import sys
 
 import equipoise
 import numpy as np
@@ -77,6 +79,57 @@ def test_values_agree_with_the_generated_decoder(known_log):
                 record[name], getattr(decoded, name), err_msg=f"{event.channel}.{name}"
             )
     assert {channel: records.size for channel, records in log.items()} == {c: i + 1 for c, i in rows.items()}
+
+
+def test_all_parts_of_a_rotated_log_are_read_in_order(tmp_path):
+    data = small_log(tmp_path / "all.lcm", ticks=60).read_bytes()
+    each = len(data) // 6
+    for number in (10000, 9999, 2, 1):
+        begin = [None, 1, 2, 9999, 10000].index(number)
+        (tmp_path / f"a.{number:04d}.lcm").write_bytes(data[begin * each : (begin + 1) * each])
+    (tmp_path / "a.lcm").write_bytes(data[:each])
+    (tmp_path / "a.old.lcm").write_bytes(data)  # others
+    (tmp_path / "ab.0001.lcm").write_bytes(data)
+    log = read_log(tmp_path / "a.lcm")
+    assert log.notes == []
+    assert log["EQUIPOISE_STATE"]["tick"].tolist() == list(range(50))
+    (tmp_path / "a.lcm").unlink()  # space was short
+    assert read_log(tmp_path / "a.lcm")["EQUIPOISE_STATE"]["tick"].tolist() == list(range(10, 50))
+    with (tmp_path / "a.0002.lcm").open("ab") as part:
+        part.write(b"torn")
+    notes = read_log(tmp_path / "a.lcm").notes
+    assert notes == [f"a.0002.lcm: cut off after {each} of {each + 4} bytes; what precedes is used"]
+
+
+def test_memory_does_not_grow_with_the_log(tmp_path):
+    """Reading fifty times as much takes as much memory; a hole of 1 GB between two events takes none."""
+    data = small_log(tmp_path / "once.lcm", ticks=2000).read_bytes()
+
+    def peak_MB(times, hole=0):
+        path = tmp_path / f"{times}.lcm"
+        with path.open("wb") as file:
+            file.write(data)
+            file.seek(hole, 1)
+            for _ in range(times):
+                file.write(data)
+        program = (
+            "import resource, sys; from equipoise_tools.log import read_log; log = read_log(sys.argv[1]);"
+            "print(log['EQUIPOISE_STATE'].size, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
+        )
+        ran = subprocess.run(
+            [sys.executable, "-c", program, path],
+            env={"PYTHONPATH": ":".join(sys.path), "OPENBLAS_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        ticks, peak = map(int, ran.stdout.split())
+        assert ticks == 2000 * (times + 1)
+        return peak
+
+    small = peak_MB(1)
+    assert peak_MB(49) < small + 10  # 18 MB of log
+    assert peak_MB(2, hole=1 << 30) < small + 10
 
 
 @pytest.mark.parametrize("missing", [1, 40, 150])

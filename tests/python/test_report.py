@@ -1,7 +1,10 @@
 """The report finds in a known log what was put there, and draws it."""
 
 import base64
+import os
 import re
+import subprocess
+import sys
 
 import equipoise_tools.figures as figures
 import matplotlib.image
@@ -141,3 +144,25 @@ def test_user_errors_are_one_line_and_status_2(tmp_path, capsys, known_log):
     blocked.write_text("")
     assert report.main([str(known_log), "--out", str(blocked)]) == 2
     assert capsys.readouterr().err.startswith(f"error: {blocked}")
+
+
+@pytest.mark.parametrize(
+    "module", ["report", "tally", "view", "lockstep_client", "reliability", "lint", "experiments"]
+)
+def test_nobody_complains_when_the_output_is_not_read_on(module, known_log, tmp_path):
+    arguments = [known_log, "--out", tmp_path] if module == "report" else ["--help"]
+    if module == "tally":
+        arguments = []
+    command = [sys.executable, "-m", f"equipoise_tools.{module}", *map(str, arguments)]
+    unread, end = os.pipe()
+    os.close(unread)
+    ended = subprocess.run(
+        command,
+        stdout=end,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": ":".join(sys.path)},
+    )
+    os.close(end)
+    assert ended.stderr == ""
+    assert ended.returncode in (0, 141)

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .entry import leave
 from .experiments.runs import simulate, summarise
 from .paths import UserError, repository_root
 
@@ -197,4 +198,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main)

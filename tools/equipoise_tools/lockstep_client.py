@@ -14,6 +14,7 @@ import socket
 
 import numpy as np
 
+from .entry import leave
 from .paths import import_lcm_types
 
 G, DT, SUBSTEPS = 9.8, 0.005, 5
@@ -101,4 +102,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    leave(main)

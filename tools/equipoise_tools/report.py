@@ -7,6 +7,7 @@ import io
 import sys
 from pathlib import Path
 
+from .entry import leave
 from .figures import draw_report, headline
 from .log import Log, read_log
 from .metrics import Summary, summarise
@@ -62,4 +63,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import lcm
 
 from . import names
+from .entry import leave
 from .lcm_types import message_types
 from .paths import UserError
 
@@ -177,4 +178,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main)

@@ -1,9 +1,11 @@
-// What the real-time thread hands over once per tick: one trivially copyable record.
+// What the real-time thread hands over once per tick: one trivially copyable record, and what a run is.
 // In: the tick's inputs and results -> out: scalars and arrays for telemetry, log and replay. RT-safe.
+// A new field: here, in fields.hpp and in lcm/*.lcm; log, telemetry, replay, CSV, MCAP and Python follow.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <type_traits>
 
 #include "equipoise/samples.hpp"
@@ -55,9 +57,11 @@ struct TickRecord {
   std::array<double, kMaxMotors> duty;
   bool enable;
   bool saturated;
+  std::int32_t motors;  // of the robot; the rest of `duty` is empty
   // health
   std::int32_t arm_state;
   std::uint32_t reasons;
+  std::uint32_t degraded;  // bits of what the robot does without; 0: all is well
   double battery_V;
   // timing
   std::int64_t wake_late_ns;
@@ -67,5 +71,22 @@ struct TickRecord {
 };
 
 static_assert(std::is_trivially_copyable_v<TickRecord>, "the hand-over is a memcpy");
+static_assert(kMaxEstimators <= 32, "TickRecord::compared has a bit for each");
+
+/// What a log is a log of: its first event.
+struct RunInfo {
+  std::string robot;
+  std::string estimator;  // the one that controls
+  std::string controller;
+  std::string fidelity;  // of the simulated world; empty on hardware
+  std::int64_t seed = 0;
+  double rolling_radius_m = 0.0;  // of the ball (MBBR) or the wheels (MIP): rolling angle to metres
+  std::string version;
+  std::string config_sha256;
+  std::string config_toml;  // as loaded, overrides applied
+  std::string backend;      // sim, board, lockstep
+  std::string board_toml;   // on hardware, the wiring
+  std::string attitude;     // source: dmp, own; empty: as configured
+};
 
 }  // namespace equipoise::runtime

@@ -20,28 +20,13 @@ namespace equipoise::runtime {
 /// Stays on this host: time to live 0.
 inline constexpr const char* kDefaultTelemetryUrl = "udpm://239.255.76.67:7667?ttl=0";
 
-/// What a log is a log of: its first event.
-struct RunInfo {
-  std::string robot;
-  std::string estimator;
-  std::string controller;
-  std::string fidelity;  // empty on hardware
-  std::int64_t seed = 0;
-  double rolling_radius_m = 0.0;
-  std::string version;
-  std::string config_sha256;
-  std::string config_toml;
-  std::string backend;     // sim, board, lockstep
-  std::string board_toml;  // on hardware, the wiring
-  std::string attitude;    // source: dmp, own; empty: as configured
-};
-
 struct TelemetryOptions {
   std::string log_path;                 // empty: no log
   std::string url;                      // LCM provider; empty: nothing is published
   std::int64_t max_log_bytes = 0;       // then the log goes on in NAME.0001.lcm, ...; 0: one file
   std::int64_t min_free_bytes = 0;      // below it the run's oldest files are deleted, then the log stops
   bool sync = false;                    // to the disk itself, for a power cut; else to the kernel
+  bool keep_previous = false;           // a log of the same name is moved aside rather than replaced
   double max_publish_hz = 100.0;        // of wall-clock time; the log always has every tick
   bool wait_when_full = false;          // simulation faster than real time: wait rather than drop
   std::vector<std::string> estimators;  // names of TickRecord::others

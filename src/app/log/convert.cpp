@@ -1,14 +1,21 @@
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <functional>
+#include <set>
 
 #include "app/cli/commands.hpp"
-#include "app/log/flight_log.hpp"
 #include "app/log/mcap_writer.hpp"
+#include "app/log/run_log.hpp"
+#include "equipoise/runtime/wire.hpp"
 
 namespace equipoise::app {
 namespace {
+
+using runtime::StateRecord;
+using runtime::TickRecord;
+namespace fields = runtime::fields;
 
 struct Arguments {
   std::string log;
@@ -16,103 +23,201 @@ struct Arguments {
   std::string out;
 };
 
-/// Name and value of every number of a tick, channel by channel.
-using Visit = std::function<void(const std::string& channel, const std::string& field, double value)>;
-
-template <std::size_t N>
-void each(const Visit& visit, const std::string& channel, const std::string& field,
-          const double (&values)[N]) {
-  for (std::size_t i = 0; i < N; ++i) visit(channel, field + "_" + std::to_string(i), values[i]);
-}
-
-void visit_state(const Visit& visit, const std::string& channel, const state_t& s) {
-  each(visit, channel, "theta_rad", s.theta_rad);
-  each(visit, channel, "omega_B_rad_s", s.omega_B_rad_s);
-  each(visit, channel, "phi_rad", s.phi_rad);
-  each(visit, channel, "phi_dot_rad_s", s.phi_dot_rad_s);
-  each(visit, channel, "position_W_m", s.position_W_m);
-  visit(channel, "normalized_innovation", s.normalized_innovation);
-}
-
-void visit_tick(const LoggedTick& t, const Visit& visit) {
-  each(visit, "sensors", "gyro_counts", t.sensors.gyro_counts);
-  each(visit, "sensors", "accel_counts", t.sensors.accel_counts);
-  each(visit, "sensors", "encoder_counts", t.sensors.encoder_counts);
-  each(visit, "sensors", "attitude_wxyz", t.sensors.attitude_wxyz);
-  visit("sensors", "battery_counts", t.sensors.battery_counts);
-  visit("sensors", "valid", t.sensors.valid);
-  visit("sensors", "health", t.sensors.health);
-  each(visit, "command", "velocity_W_m_s", t.command.velocity_W_m_s);
-  visit("command", "yaw_rate_rad_s", t.command.yaw_rate_rad_s);
-  visit("command", "arm", t.command.arm);
-  visit("command", "heading_reset", t.command.heading_reset);
-  visit_state(visit, "state", t.estimate);
-  visit_state(visit, "reference", t.reference);
-  if (t.has_truth) visit_state(visit, "truth", t.truth);
-  each(visit, "motors", "u_lin", t.motors.u_lin);
-  each(visit, "motors", "u_friction", t.motors.u_friction);
-  each(visit, "motors", "duty", t.motors.duty);
-  visit("motors", "enable", t.motors.enable);
-  visit("motors", "saturated", t.motors.saturated);
-  visit("health", "arm_state", t.health.arm_state);
-  visit("health", "reasons", t.health.reasons);
-  visit("health", "battery_V", t.health.battery_V);
-}
-
-/// One row per tick; columns channel.field. The values read back as the same doubles.
-void write_csv(const FlightLog& log, std::ostream& out) {
-  out << "t_s,tick";
-  visit_tick(log.ticks.front(), [&](const std::string& channel, const std::string& field, double) {
-    out << ',' << channel << '.' << field;
-  });
+/// Shortest text that reads back as the same number.
+template <class Number>
+void append_number(Number value, std::string* to) {
   char text[40];
-  for (const LoggedTick& tick : log.ticks) {
-    std::snprintf(text, sizeof text, "\n%.6f,%lld", static_cast<double>(tick.sensors.utime) * 1e-6,
-                  static_cast<long long>(tick.sensors.tick));
-    out << text;
-    visit_tick(tick, [&](const std::string&, const std::string&, double value) {
-      std::snprintf(text, sizeof text, ",%.17g", value);
-      out << text;
-    });
-  }
-  out << '\n';
+  const auto end = std::to_chars(std::begin(text), std::end(text), value);
+  to->append(text, end.ptr);
+}
+void append_number(bool value, std::string* to) { *to += value ? '1' : '0'; }
+
+/// number(field, unit, value) for each number of a message's fields; field_0, field_1, ... of an array.
+template <class Message, class Record, class Number>
+void each_number(Message, const Record& record, Number&& number) {
+  Message::visit(record, [&](const char* name, const char* unit, const auto& value) {
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_arithmetic_v<Value>) {
+      number(std::string(name), unit, value);
+    } else {
+      std::size_t i = 0;
+      for (const auto& element : value) number(std::string(name) + "_" + std::to_string(i++), unit, element);
+    }
+  });
 }
 
-/// One JSON message per channel and tick: what Foxglove plots without a plug-in.
-void write_mcap(const FlightLog& log, std::ostream& out) {
-  McapWriter mcap(out);
-  mcap.metadata("run", {{"robot", log.run.robot},
-                        {"estimator", log.run.estimator},
-                        {"controller", log.run.controller},
-                        {"fidelity", log.run.fidelity},
-                        {"version", log.run.version},
-                        {"config_sha256", log.run.config_sha256},
-                        {"config_toml", log.run.config_toml}});
-  for (const LoggedTick& tick : log.ticks) {
-    std::map<std::string, nlohmann::json> messages;
-    visit_tick(tick, [&](const std::string& channel, const std::string& field, double value) {
-      messages[channel][field] = value;
-    });
-    for (auto& [channel, message] : messages) {
-      message["tick"] = tick.sensors.tick;
-      mcap.message("equipoise/" + channel, tick.sensors.utime * 1000, message);
+/// Which channels a log has, in alphabetical order.
+std::set<std::string, std::less<>> channels_of(const std::string& path) {
+  std::set<std::string, std::less<>> channels;
+  LogReader reader = LogReader::open(path);
+  for (LogEvent event; reader.next(&event);) {
+    if (channels.find(event.channel) == channels.end()) channels.emplace(event.channel);
+  }
+  return channels;
+}
+
+/// One row per tick; columns channel.field. What a tick lacks is an empty cell.
+class CsvRows {
+ public:
+  explicit CsvRows(const std::string& path) {
+    for (const std::string& channel : channels_of(path)) {
+      has_truth_ = has_truth_ || channel == fields::kTruthChannel;
+      if (channel.rfind(fields::kComparedChannel, 0) == 0)
+        estimators_.push_back(short_name(channel.substr(fields::kComparedChannel.size())));
     }
   }
-  mcap.finish();
+
+  std::string head() const {
+    std::string line = "t_s,tick";
+    const auto name = [&line](const std::string& channel) {
+      return [&line, channel](const std::string& field, const char*, auto) {
+        line += "," + channel + "." + field;
+      };
+    };
+    const TickRecord none{};
+    fields::each_message(none, [&](auto message, const char* channel, const auto& record) {
+      each_number(message, record, name(short_name(channel)));
+    });
+    if (has_truth_) each_number(fields::State{}, none.truth, name("truth"));
+    for (const std::string& estimator : estimators_)
+      each_number(fields::State{}, none.estimate, name("state_" + estimator));
+    return line + "\n";
+  }
+
+  const std::string& row(const TickRecord& tick, const std::vector<std::string>& others) {
+    row_.clear();
+    char time[32];
+    std::snprintf(time, sizeof time, "%.6f", static_cast<double>(tick.now_ns) * 1e-9);
+    row_ += time;
+    row_ += ',';
+    append_number(tick.tick, &row_);
+    fields::each_message(
+        tick, [&](auto message, const char*, const auto& record) { cells(message, record, true); });
+    if (has_truth_) cells(fields::State{}, tick.truth, tick.has_truth);
+    for (const std::string& estimator : estimators_) {
+      const auto found = std::find(others.begin(), others.end(), estimator);
+      const auto i = static_cast<std::size_t>(found - others.begin());
+      const bool has = found != others.end() && (tick.compared & (1U << i)) != 0;
+      cells(fields::State{}, tick.others[has ? i : 0], has);
+    }
+    row_ += '\n';
+    return row_;
+  }
+
+ private:
+  template <class Message, class Record>
+  void cells(Message message, const Record& record, bool has) {
+    each_number(message, record, [this, has](const std::string&, const char*, auto value) {
+      row_ += ',';
+      if (has) append_number(value, &row_);
+    });
+  }
+
+  bool has_truth_ = false;
+  std::vector<std::string> estimators_;
+  std::string row_;
+};
+
+std::int64_t write_csv(const std::string& path, std::ostream& out) {
+  CsvRows rows(path);
+  out << rows.head();
+  RunLog log(path);
+  std::int64_t ticks = 0;
+  for (TickRecord tick; log.next(&tick); ++ticks) out << rows.row(tick, log.estimators());
+  return ticks;
+}
+
+/// Every message of the log as JSON numbers: what Foxglove plots without a plug-in.
+class McapMessages {
+ public:
+  explicit McapMessages(std::ostream& out) : mcap_(out) {}
+
+  void run(const runtime::RunInfo& run) {
+    std::map<std::string, std::string> entries;
+    fields::Run::visit(run, [&](const char* name, const char*, const auto& value) {
+      if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
+        append_number(value, &entries[name]);
+      } else {
+        entries[name] = value;
+      }
+    });
+    mcap_.metadata("run", entries);
+  }
+
+  void event(const LogEvent& event) {
+    const bool state =
+        event.channel == fields::kTruthChannel || event.channel.rfind(fields::kComparedChannel, 0) == 0;
+    if (state) message(fields::State{}, event, &tick_.truth);
+    if (event.channel == fields::kHistogramChannel) message(fields::Histogram{}, event, &histogram_);
+    fields::each_message(tick_, [&](auto type, std::string_view channel, auto& record) {
+      if (channel == event.channel) message(type, event, &record);
+    });
+  }
+
+  void finish() { mcap_.finish(); }
+
+ private:
+  template <class Message, class Record>
+  void message(Message type, const LogEvent& event, Record* record) {
+    std::int64_t utime = 0;
+    std::int64_t tick = 0;
+    if (!runtime::decode(type, event.data, record, &utime, &tick)) return;
+    json_ = "{\"tick\":";
+    append_number(tick, &json_);
+    each_number(type, *record, [this](const std::string& field, const char*, auto value) {
+      json_ += ",\"" + field + "\":";
+      if (std::isfinite(static_cast<double>(value))) {
+        append_number(value, &json_);
+      } else {
+        json_ += "null";  // JSON knows no other word for it
+      }
+    });
+    json_ += '}';
+    mcap_.message(channel(type, event.channel, *record), utime * 1000, json_);
+  }
+
+  template <class Message, class Record>
+  std::uint16_t channel(Message type, std::string_view name, const Record& record) {
+    const auto known = channels_.find(name);
+    if (known != channels_.end()) return known->second;
+    nlohmann::json schema = {{"type", "object"}, {"properties", {{"tick", {{"type", "integer"}}}}}};
+    each_number(type, record, [&](const std::string& field, const char* unit, auto) {
+      schema["properties"][field] = {{"type", "number"}};
+      if (*unit != '\0') schema["properties"][field]["description"] = unit;
+    });
+    const std::uint16_t id = mcap_.add_channel("equipoise/" + short_name(name), schema.dump());
+    channels_.emplace(name, id);
+    return id;
+  }
+
+  McapWriter mcap_;
+  std::map<std::string, std::uint16_t, std::less<>> channels_;
+  TickRecord tick_{};
+  fields::HistogramRecord histogram_{};
+  std::string json_;
+};
+
+std::int64_t write_mcap(const std::string& path, std::ostream& out) {
+  McapMessages messages(out);
+  messages.run(RunLog(path).run());
+  LogReader reader = LogReader::open(path);
+  std::int64_t ticks = 0;
+  for (LogEvent event; reader.next(&event);) {
+    messages.event(event);
+    ticks += event.channel == fields::kSensorsChannel ? 1 : 0;
+  }
+  messages.finish();
+  return ticks;
 }
 
 int convert(Arguments a) {
-  const FlightLog log = read_flight_log(a.log);
-  if (log.ticks.empty()) throw InputError(a.log + ": holds no whole tick");
+  TickRecord first;
+  if (!RunLog(a.log).next(&first)) throw InputError(a.log + ": holds no whole tick");
   if (a.out.empty()) a.out = std::filesystem::path(a.log).replace_extension(a.to).string();
   std::ofstream file(a.out, std::ios::binary);
-  if (a.to == "csv") {
-    write_csv(log, file);
-  } else {
-    write_mcap(log, file);
-  }
+  const std::int64_t ticks = a.to == "csv" ? write_csv(a.log, file) : write_mcap(a.log, file);
   if (!file.flush()) throw InputError(a.out + ": cannot be written");
-  std::printf("%s: %zu ticks\n", a.out.c_str(), log.ticks.size());
+  std::printf("%s: %lld ticks\n", a.out.c_str(), static_cast<long long>(ticks));
   return 0;
 }
 
@@ -121,7 +226,7 @@ int convert(Arguments a) {
 void add_convert(Subcommand app) {
   const Subcommand command = app.subcommand("convert", "Converts a log for other tools");
   auto a = std::make_shared<Arguments>();
-  command.option("log", a->log, "LCM event log of sim or run").required();
+  command.option("log", a->log, "LCM event log of sim or run; its further parts are found").required();
   command.option("--to", a->to, "mcap (Foxglove) or csv").required().one_of({"mcap", "csv"});
   command.option("--out", a->out, "file to write (default: beside the log)");
   command.action([=] { return convert(*a); });

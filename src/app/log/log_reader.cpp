@@ -1,9 +1,9 @@
 #include "app/log/log_reader.hpp"
 
-#include <cstdio>
 #include <filesystem>
 
-#include "app/cli/commands.hpp"
+#include "app/cli/errors.hpp"
+#include "equipoise/runtime/log_parts.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -12,6 +12,7 @@ constexpr std::string_view kSync("\xED\xA1\xDA\x01", 4);
 constexpr std::size_t kHeader = 28;  // sync, number, time in microseconds, lengths of channel and data
 constexpr std::size_t kLongestChannel = 256;
 constexpr std::size_t kLargestMessage = 1U << 24U;
+constexpr std::size_t kReadBytes = 1U << 18U;
 
 std::uint64_t big_endian(std::string_view bytes) {
   std::uint64_t value = 0;
@@ -23,38 +24,79 @@ std::size_t length(std::string_view four_bytes) { return static_cast<std::size_t
 
 }  // namespace
 
+LogReader LogReader::open(const std::string& path) {
+  LogReader reader;
+  reader.parts_ = runtime::existing_log_parts(path);
+  if (reader.parts_.empty() || !reader.next_part()) throw InputError(path + ": cannot be read");
+  return reader;
+}
+
+LogReader LogReader::over(std::string bytes) {
+  LogReader reader;
+  reader.buffer_ = std::move(bytes);
+  return reader;
+}
+
+bool LogReader::next_part() {
+  if (next_part_ == parts_.size()) return false;
+  const std::string& path = parts_[next_part_++];
+  file_.close();
+  file_.clear();
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    throw InputError(path + ": cannot be read: no regular file");
+  file_.open(path, std::ios::binary);
+  if (!file_) throw InputError(path + ": cannot be read");
+  return true;
+}
+
+/// So many bytes of this part are in the buffer from at_ on.
+bool LogReader::has(std::size_t bytes) {
+  while (buffer_.size() - at_ < bytes) {
+    if (!file_.is_open() || !file_) return false;
+    buffer_.erase(0, at_);
+    at_ = 0;
+    const std::size_t kept = buffer_.size();
+    buffer_.resize(kept + kReadBytes);
+    file_.read(buffer_.data() + kept, static_cast<std::streamsize>(kReadBytes));
+    buffer_.resize(kept + static_cast<std::size_t>(file_.gcount()));
+  }
+  return true;
+}
+
+void LogReader::skip_to_sync() {
+  ++at_;
+  ++damaged_;
+  while (has(kSync.size())) {
+    const std::size_t found = buffer_.find(kSync, at_);
+    const std::size_t to = found != std::string::npos ? found : buffer_.size() - (kSync.size() - 1);
+    damaged_ += to - at_;
+    at_ = to;
+    if (found != std::string::npos) return;
+  }
+  damaged_ += buffer_.size() - at_;
+  at_ = buffer_.size();
+}
+
 bool LogReader::next(LogEvent* event) {
-  while (at_ < bytes_.size()) {
-    const std::string_view rest = bytes_.substr(at_);
-    if (rest.size() >= kHeader && rest.substr(0, 4) == kSync) {
-      const std::size_t channel = length(rest.substr(20, 4));
-      const std::size_t data = length(rest.substr(24, 4));
-      if (channel <= kLongestChannel && data <= kLargestMessage && kHeader + channel + data <= rest.size()) {
-        event->utime = static_cast<std::int64_t>(big_endian(rest.substr(12, 8)));
-        event->channel = rest.substr(kHeader, channel);
-        event->data = rest.substr(kHeader + channel, data);
+  for (;;) {
+    if (!has(1)) {
+      if (!next_part()) return false;
+      continue;
+    }
+    if (has(kHeader) && buffer_.compare(at_, kSync.size(), kSync) == 0) {
+      const std::string_view header(buffer_.data() + at_, kHeader);
+      const std::size_t channel = length(header.substr(20, 4));
+      const std::size_t data = length(header.substr(24, 4));
+      const auto utime = static_cast<std::int64_t>(big_endian(header.substr(12, 8)));
+      if (channel <= kLongestChannel && data <= kLargestMessage && has(kHeader + channel + data)) {
+        const std::string_view body(buffer_.data() + at_ + kHeader, channel + data);
+        *event = {utime, body.substr(0, channel), body.substr(channel)};
         at_ += kHeader + channel + data;
         return true;
       }
     }
-    const std::size_t following = rest.find(kSync, 1);
-    const std::size_t skipped = following == std::string_view::npos ? rest.size() : following;
-    damaged_ += skipped;
-    at_ += skipped;
-  }
-  return false;
-}
-
-std::string read_log_parts(const std::string& path) {
-  std::string bytes = read_text(path);
-  const std::filesystem::path p(path);
-  for (int i = 1;; ++i) {
-    char middle[16];
-    std::snprintf(middle, sizeof middle, ".%04d", i);
-    const std::filesystem::path part =
-        p.parent_path() / (p.stem().string() + middle + p.extension().string());
-    if (!std::filesystem::exists(part)) return bytes;
-    bytes += read_text(part.string());
+    skip_to_sync();
   }
 }
 

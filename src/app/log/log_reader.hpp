@@ -1,15 +1,17 @@
-// Reads LCM event logs, also cut off or damaged ones. In: bytes of a file -> out: its whole events, in order,
-// and how many bytes belong to none. Not for the tick.
+// Reads LCM event logs, also cut off or damaged ones, in bounded memory. In: path of a log, all of whose
+// parts are read in order, or bytes -> out: its whole events, and how many bytes belong to none. Not for the
+// tick.
 #pragma once
 
 #include <cstdint>
+#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace equipoise::app {
 
-struct LogEvent {
+struct LogEvent {  // valid until the next one is read
   std::int64_t utime = 0;
   std::string_view channel;
   std::string_view data;
@@ -17,8 +19,9 @@ struct LogEvent {
 
 class LogReader {
  public:
-  /// The bytes must outlive the reader.
-  explicit LogReader(std::string_view bytes) : bytes_(bytes) {}
+  /// InputError when there is no such file.
+  static LogReader open(const std::string& path);
+  static LogReader over(std::string bytes);
 
   /// False at the end.
   bool next(LogEvent* event);
@@ -26,12 +29,17 @@ class LogReader {
   std::size_t damaged_bytes() const { return damaged_; }
 
  private:
-  std::string_view bytes_;
+  LogReader() = default;
+  bool has(std::size_t bytes);
+  bool next_part();
+  void skip_to_sync();
+
+  std::vector<std::string> parts_;
+  std::size_t next_part_ = 0;
+  std::ifstream file_;
+  std::string buffer_;
   std::size_t at_ = 0;
   std::size_t damaged_ = 0;
 };
-
-/// All parts of a run, NAME.lcm, NAME.0001.lcm, ... in one string; InputError when there is none.
-std::string read_log_parts(const std::string& path);
 
 }  // namespace equipoise::app

@@ -5,8 +5,9 @@
 #include <optional>
 
 #include "app/cli/commands.hpp"
-#include "app/log/flight_log.hpp"
+#include "app/log/run_log.hpp"
 #include "app/run/firmware.hpp"
+#include "equipoise/runtime/fields.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -32,48 +33,42 @@ std::uint64_t bits(double value) {
   return bits;
 }
 
-/// Compares bit for bit, but takes any NaN for any other.
-class Comparison {
- public:
-  explicit Comparison(std::int64_t tick, Difference* difference) : tick_(tick), difference_(difference) {}
+/// What the tick computed; the rest went into it, or is about the loop.
+template <class Message>
+constexpr bool kComputed =
+    std::is_same_v<Message, runtime::fields::State> || std::is_same_v<Message, runtime::fields::Motors> ||
+    std::is_same_v<Message, runtime::fields::Health>;
 
-  void value(const std::string& field, double logged, double replayed) {
-    if (difference_->found || bits(logged) == bits(replayed)) return;
-    if (std::isnan(logged) && std::isnan(replayed)) return;
-    *difference_ = {true, tick_, field, logged, replayed};
-  }
-  template <std::size_t N, class Replayed>
-  void values(const std::string& field, const double (&logged)[N], const Replayed& replayed) {
-    for (std::size_t i = 0; i < N && !difference_->found; ++i)
-      value(field + "[" + std::to_string(i) + "]", logged[i], replayed[i]);
-  }
-  void state(const std::string& channel, const state_t& logged, const runtime::StateRecord& replayed) {
-    values(channel + ".theta_rad", logged.theta_rad, replayed.theta_rad);
-    values(channel + ".omega_B_rad_s", logged.omega_B_rad_s, replayed.omega_B_rad_s);
-    values(channel + ".phi_rad", logged.phi_rad, replayed.phi_rad);
-    values(channel + ".phi_dot_rad_s", logged.phi_dot_rad_s, replayed.phi_dot_rad_s);
-    values(channel + ".position_W_m", logged.position_W_m, replayed.position_W_m);
-    value(channel + ".normalized_innovation", logged.normalized_innovation, replayed.normalized_innovation);
-  }
+/// number(channel, field, index or -1, value) for each number that the tick computed, in the order of the
+/// tick.
+template <class Number>
+void each_computed(const runtime::TickRecord& r, Number&& number) {
+  runtime::fields::each_message(r, [&](auto message, const char* channel, const auto& record) {
+    if constexpr (kComputed<decltype(message)>) {
+      decltype(message)::visit(record, [&](const char* field, const char*, const auto& value) {
+        if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
+          number(channel, field, -1, static_cast<double>(value));
+        } else {
+          int i = 0;
+          for (const double element : value) number(channel, field, i++, element);
+        }
+      });
+    }
+  });
+}
 
- private:
-  std::int64_t tick_;
-  Difference* difference_;
-};
-
-/// In the order of the tick, so that the first difference is nearest to its cause.
-void compare(const LoggedTick& logged, const runtime::TickRecord& r, Difference* difference) {
-  Comparison c(logged.sensors.tick, difference);
-  c.state("EQUIPOISE_STATE", logged.estimate, r.estimate);
-  c.state("EQUIPOISE_REFERENCE", logged.reference, r.reference);
-  c.values("EQUIPOISE_MOTORS.u_lin", logged.motors.u_lin, r.u_lin);
-  c.values("EQUIPOISE_MOTORS.u_friction", logged.motors.u_friction, r.u_friction);
-  c.value("EQUIPOISE_MOTORS.saturated", logged.motors.saturated, r.saturated ? 1 : 0);
-  c.value("EQUIPOISE_HEALTH.battery_V", logged.health.battery_V, r.battery_V);
-  c.value("EQUIPOISE_HEALTH.reasons", static_cast<std::uint32_t>(logged.health.reasons), r.reasons);
-  c.value("EQUIPOISE_HEALTH.arm_state", logged.health.arm_state, r.arm_state);
-  c.values("EQUIPOISE_MOTORS.duty", logged.motors.duty, r.duty);
-  c.value("EQUIPOISE_MOTORS.enable", logged.motors.enable, r.enable ? 1 : 0);
+/// Bit for bit, but any NaN is any other.
+void compare(const runtime::TickRecord& logged, const runtime::TickRecord& replayed, Difference* difference) {
+  if (difference->found) return;
+  std::vector<double> expected;
+  each_computed(logged, [&](const char*, const char*, int, double value) { expected.push_back(value); });
+  std::size_t at = 0;
+  each_computed(replayed, [&](const char* channel, const char* field, int i, double value) {
+    const double was = expected[at++];
+    if (difference->found || bits(was) == bits(value) || (std::isnan(was) && std::isnan(value))) return;
+    const std::string index = i < 0 ? "" : "[" + std::to_string(i) + "]";
+    *difference = {true, logged.tick, std::string(channel) + "." + field + index, was, value};
+  });
 }
 
 /// Root mean square errors of an estimate against the log's truth, after the first five seconds as in sim.
@@ -83,7 +78,7 @@ struct Errors {
   double position = 0.0;
   std::int64_t ticks = 0;
 
-  void add(const runtime::StateRecord& x, const state_t& truth) {
+  void add(const runtime::StateRecord& x, const runtime::StateRecord& truth) {
     const auto square = [](double a) { return a * a; };
     for (std::size_t i = 0; i < 2; ++i) {
       attitude += square(x.theta_rad[i] - truth.theta_rad[i]) / 2.0;
@@ -120,6 +115,8 @@ bool recall(const runtime::StateRecord& s, MbbrEstimate* truth) noexcept {
 
 struct Replay {
   std::int64_t ticks = 0;
+  std::int64_t incomplete = 0;  // ticks of which the log lost a part
+  std::size_t damaged_bytes = 0;
   std::int64_t missing = 0;  // ticks that the log lost
   Difference difference;
   Errors logged, other;
@@ -129,27 +126,28 @@ struct Replay {
 
 /// `other`: index of an estimator that runs beside the one that flew, on the same samples and inputs.
 template <class Pipeline>
-Replay replay(const FlightLog& log, Pipeline& pipeline, std::optional<std::size_t> other) {
+Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other) {
   constexpr std::int64_t kSettled = 1000;  // ticks, 5 s
   Replay out;
   runtime::TickRecord record{};
   std::int64_t expected = 0;
-  for (const LoggedTick& tick : log.ticks) {
-    out.missing += tick.sensors.tick - expected;
-    expected = tick.sensors.tick + 1;
+  for (runtime::TickRecord tick; log.next(&tick);) {
+    out.missing += tick.tick - expected;
+    expected = tick.tick + 1;
     decltype(Pipeline::Result::x_hat) known;
-    if (tick.has_truth && recall(state_of(tick.truth), &known)) pipeline.estimators().observe_truth(known);
-    const RawSample raw = raw_of(tick.sensors);
-    const Command command = command_of(tick.command);
-    const auto result = pipeline.tick(raw, command);
-    record_tick(tick.sensors.tick, tick.sensors.utime * 1000, raw, command, result, pipeline, &record);
+    if (tick.has_truth && recall(tick.truth, &known)) pipeline.estimators().observe_truth(known);
+    const Command command = command_of(tick);
+    const auto result = pipeline.tick(tick.raw, command);
+    record_tick(tick.tick, tick.now_ns, tick.raw, command, result, pipeline, &record);
     compare(tick, record, &out.difference);
-    if (tick.has_truth && tick.sensors.tick >= kSettled) {
-      out.logged.add(state_of(tick.estimate), tick.truth);
+    if (tick.has_truth && tick.tick >= kSettled) {
+      out.logged.add(tick.estimate, tick.truth);
       if (other) out.other.add(record.others[*other], tick.truth);
     }
     ++out.ticks;
   }
+  out.incomplete = log.incomplete_ticks();
+  out.damaged_bytes = log.damaged_bytes();
   return out;
 }
 
@@ -159,7 +157,7 @@ std::string shown(double value) {
   return text;
 }
 
-nlohmann::json to_json(const Arguments& a, const FlightLog& log, const Replay& r) {
+nlohmann::json to_json(const Arguments& a, const runtime::RunInfo& run, const Replay& r) {
   nlohmann::json difference = nullptr;
   if (r.difference.found) {
     difference = {{"tick", r.difference.tick},
@@ -167,32 +165,32 @@ nlohmann::json to_json(const Arguments& a, const FlightLog& log, const Replay& r
                   {"logged", r.difference.logged},
                   {"replayed", r.difference.replayed}};
   }
-  nlohmann::json errors = {{log.run.estimator, r.logged.json(log.run.rolling_radius_m)}};
-  if (!a.estimator.empty()) errors[a.estimator] = r.other.json(log.run.rolling_radius_m);
+  nlohmann::json errors = {{run.estimator, r.logged.json(run.rolling_radius_m)}};
+  if (!a.estimator.empty()) errors[a.estimator] = r.other.json(run.rolling_radius_m);
   return {{"log", a.log},
-          {"robot", log.run.robot},
-          {"estimator", log.run.estimator},
-          {"controller", log.run.controller},
-          {"fidelity", log.run.fidelity},
+          {"robot", run.robot},
+          {"estimator", run.estimator},
+          {"controller", run.controller},
+          {"fidelity", run.fidelity},
           {"ticks", r.ticks},
           {"identical", r.identical()},
           {"first_difference", difference},
           {"missing_ticks", r.missing},
-          {"incomplete_ticks", log.incomplete_ticks},
-          {"damaged_bytes", log.damaged_bytes},
+          {"incomplete_ticks", r.incomplete},
+          {"damaged_bytes", r.damaged_bytes},
           {"errors", errors},
-          {"log_version", log.run.version},
+          {"log_version", run.version},
           {"version", version()}};
 }
 
-void print(std::FILE* out, const Arguments& a, const FlightLog& log, const Replay& r) {
-  std::fprintf(out, "%s: %s, %s, %s, %lld ticks\n", a.log.c_str(), log.run.robot.c_str(),
-               log.run.estimator.c_str(), log.run.controller.c_str(), static_cast<long long>(r.ticks));
+void print(std::FILE* out, const Arguments& a, const runtime::RunInfo& run, const Replay& r) {
+  std::fprintf(out, "%s: %s, %s, %s, %lld ticks\n", a.log.c_str(), run.robot.c_str(), run.estimator.c_str(),
+               run.controller.c_str(), static_cast<long long>(r.ticks));
   if (r.missing > 0) {
     std::fprintf(out, "  %lld ticks are missing; what follows them cannot be the same\n",
                  static_cast<long long>(r.missing));
   }
-  if (log.damaged_bytes > 0) std::fprintf(out, "  %zu bytes are damaged and left out\n", log.damaged_bytes);
+  if (r.damaged_bytes > 0) std::fprintf(out, "  %zu bytes are damaged and left out\n", r.damaged_bytes);
   if (r.difference.found) {
     std::fprintf(out, "  DIFFERS first at tick %lld: %s: logged %s, replayed %s\n",
                  static_cast<long long>(r.difference.tick), r.difference.field.c_str(),
@@ -202,12 +200,12 @@ void print(std::FILE* out, const Arguments& a, const FlightLog& log, const Repla
   }
   const auto errors = [&](const std::string& name, const Errors& e) {
     if (e.ticks == 0) return;
-    const nlohmann::json j = e.json(log.run.rolling_radius_m);
+    const nlohmann::json j = e.json(run.rolling_radius_m);
     std::fprintf(out, "  %-18s attitude %.4f rad, rolling speed %.2f cm/s, position %.3f m (RMS)\n",
                  name.c_str(), j["attitude_rmse_rad"].get<double>(),
                  100.0 * j["rolling_speed_rmse_m_s"].get<double>(), j["position_rmse_m"].get<double>());
   };
-  errors(log.run.estimator, r.logged);
+  errors(run.estimator, r.logged);
   if (!a.estimator.empty()) errors(a.estimator, r.other);
 }
 
@@ -221,24 +219,24 @@ std::optional<std::size_t> index_of(const std::string& estimator) {
 }
 
 template <class Firmware>
-int run(const Arguments& a, const FlightLog& log) {
-  Choice choice{log.run.estimator, log.run.controller, log.run.fidelity, false,
-                log.run.attitude,  log.run.backend};
+int run(const Arguments& a, RunLog& log) {
+  const runtime::RunInfo& info = log.run();
+  Choice choice{info.estimator, info.controller, info.fidelity, false, info.attitude, info.backend};
   complete<Firmware>(choice);
   std::optional<std::size_t> other;
   if (!a.estimator.empty()) {
-    Choice asked{a.estimator, log.run.controller, "", false, ""};
+    Choice asked{a.estimator, info.controller, "", false, ""};
     complete<Firmware>(asked);
     other = index_of<Firmware>(a.estimator);
     choice.compare = true;
   }
-  const auto loaded = Firmware::parse(log.run.config_toml, a.log + " (its configuration)");
+  const auto loaded = Firmware::parse(info.config_toml, a.log + " (its configuration)");
   const auto config = Firmware::apply(loaded.config, choice);
   const Replay r = Firmware::with_pipeline(config, choice.controller,
                                            [&](auto& pipeline) { return replay(log, pipeline, other); });
   if (r.ticks == 0) throw InputError(a.log + ": holds no whole tick");
-  print(a.json == "-" ? stderr : stdout, a, log, r);
-  if (!a.json.empty()) write_json(to_json(a, log, r), a.json);
+  print(a.json == "-" ? stderr : stdout, a, info, r);
+  if (!a.json.empty()) write_json(to_json(a, info, r), a.json);
   return r.identical() ? 0 : 1;
 }
 
@@ -251,8 +249,9 @@ void add_replay(Subcommand app) {
   command.option("--estimator", a->estimator, "run this one beside it; errors against the log's truth");
   command.option("--json", a->json, "result as JSON, - for stdout");
   command.action([=] {
-    const FlightLog log = read_flight_log(a->log);
-    return with_robot(log.run.robot, a->log, [&](auto firmware) { return run<decltype(firmware)>(*a, log); });
+    RunLog log(a->log);
+    return with_robot(log.run().robot, a->log,
+                      [&](auto firmware) { return run<decltype(firmware)>(*a, log); });
   });
 }
 

@@ -189,13 +189,20 @@ void record_tick(std::int64_t tick, std::int64_t now_ns, const RawSample& raw, c
   record->estimate = runtime::to_record(view(t.x_hat, robot));
   record->reference = runtime::to_record(view(t.ref, robot));
   using Estimators = std::decay_t<decltype(pipeline.estimators())>;
+  constexpr int kInputs = std::decay_t<decltype(t.u_lin)>::RowsAtCompileTime;
+  constexpr int kWheels = Pipeline::Wheels::RowsAtCompileTime;
+  static_assert(Estimators::kCount <= runtime::kMaxEstimators, "make room in TickRecord::others");
+  static_assert(kInputs > 0 && kInputs <= std::tuple_size_v<decltype(record->u_lin)>, "make room in u_lin");
+  static_assert(kWheels > 0 && kWheels <= kMaxMotors, "make room in rio_motors_t");
   record->compared = 0;
   for (std::size_t i = 0; i < Estimators::kCount && pipeline.params().estimators.compare; ++i) {
     const auto id = static_cast<typename Estimators::Id>(i);
     record->others[i] = runtime::to_record(view(pipeline.estimators().estimate(id), robot));
     record->compared |= 1U << i;
   }
-  for (int i = 0; i < t.u_lin.size(); ++i) {
+  record->motors = kWheels;
+  record->degraded = 0;  // no robot does without anything yet
+  for (int i = 0; i < kInputs; ++i) {
     record->u_lin[static_cast<std::size_t>(i)] = t.u_lin(i);
     record->u_friction[static_cast<std::size_t>(i)] = t.u_friction(i);
   }

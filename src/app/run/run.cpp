@@ -59,7 +59,7 @@ struct Outcome {
 
 /// run.lcm, run-2.lcm, run-3.lcm: a new engine is a new flight.
 std::string numbered(const std::string& path, int flight) {
-  if (flight == 1) return path;
+  if (flight == 1 || path == "off") return path;
   const std::filesystem::path p(path);
   return (p.parent_path() / (p.stem().string() + "-" + std::to_string(flight) + p.extension().string()))
       .string();
@@ -88,7 +88,8 @@ class Runner {
     Outcome outcome;
     outcome.log = numbered(a_.log, number);
     runtime::TelemetryOptions options;
-    options.log_path = outcome.log;
+    options.log_path = outcome.log == "off" ? "" : outcome.log;
+    options.keep_previous = true;
     options.url = a_.telemetry == "off" ? "" : a_.telemetry;
     if (a_.choice.compare) options.estimators = Firmware::estimators();
     options.max_log_bytes = a_.log_max_mb * 1000000;
@@ -318,7 +319,9 @@ void add_run(Subcommand app) {
   command.option("--controller", a->choice.controller, "state feedback (default: the robot's)");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command.option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
-  command.option("--log", a->log, "LCM event log (default: logs/run-BACKEND.lcm)");
+  command.option("--log", a->log,
+                 "LCM event log, or off; an earlier one of this name is kept under the time it ended "
+                 "(default: logs/run-BACKEND.lcm)");
   command.option("--log-max-mb", a->log_max_mb, "continue the log in a further file after this much, MB")
       .show_default()
       .range(1, 100000);

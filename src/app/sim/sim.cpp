@@ -128,7 +128,7 @@ int run(Arguments a) {
   if (a.log.empty()) a.log = default_log(a);
 
   runtime::TelemetryOptions telemetry_options;
-  telemetry_options.log_path = a.log;
+  telemetry_options.log_path = a.log == "off" ? "" : a.log;
   telemetry_options.url = a.telemetry == "off" ? "" : a.telemetry;
   telemetry_options.wait_when_full = !a.realtime;
   if (a.realtime) telemetry_options.max_publish_hz = 2.0 * kTickHz;
@@ -195,7 +195,7 @@ void add_sim(Subcommand app) {
       .one_of({"dmp", "own"});
   command.option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");
-  command.option("--log", a->log, "LCM event log (default: logs/sim-...)");
+  command.option("--log", a->log, "LCM event log, or off (default: logs/sim-...)");
   command.option("--json", a->json, "summary as JSON, - for stdout");
   command.flag("--realtime", a->realtime, "pace to wall-clock time");
   command.option("--telemetry", a->telemetry, "LCM provider URL, or off").show_default();

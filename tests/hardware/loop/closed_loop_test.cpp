@@ -14,13 +14,12 @@
 #include <unistd.h>
 
 #include <cstring>
-#include <equipoise/health_t.hpp>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <set>
 
-#include "app/log/log_reader.hpp"
+#include "app/log/run_log.hpp"
 #include "equipoise/actuate/safety.hpp"
 #include "syscall_trace.hpp"
 
@@ -118,18 +117,12 @@ class ClosedLoop : public ::testing::Test {
     std::uint32_t reasons = 0;
   };
   static Judgement judgement() {
-    const std::string bytes = app::read_log_parts(kLog);
-    app::LogReader reader(bytes);
-    app::LogEvent event;
+    app::RunLog log(kLog);
     bool armed = false;
-    while (reader.next(&event)) {
-      health_t health{};
-      if (event.channel != "EQUIPOISE_HEALTH" ||
-          health.decode(event.data.data(), 0, static_cast<int>(event.data.size())) < 0)
-        continue;
-      if (armed && health.arm_state != static_cast<int>(ArmState::kArmed))
-        return {health.utime * 1000, static_cast<std::uint32_t>(health.reasons)};
-      armed = armed || health.arm_state == static_cast<int>(ArmState::kArmed);
+    for (runtime::TickRecord tick; log.next(&tick);) {
+      const bool now = tick.arm_state == static_cast<int>(ArmState::kArmed);
+      if (armed && !now) return {tick.now_ns, tick.reasons};
+      armed = armed || now;
     }
     return {};
   }

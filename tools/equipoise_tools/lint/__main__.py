@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from ..entry import leave
 from ..paths import repository_root
 from . import analyzers, formatting
 from .house import house
@@ -51,4 +52,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main)

@@ -1,0 +1,25 @@
+// The files of one log. NAME.lcm goes on in NAME.0001.lcm, NAME.0002.lcm, ...; the first of them are deleted
+// when space is short. In: path -> out: paths. Not for the tick.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace equipoise::runtime {
+
+/// NAME.lcm, 3 -> NAME.0003.lcm; 0 is NAME.lcm itself.
+std::string log_part(const std::string& path, int number);
+/// Back: which part of the log `path` the file `part` is.
+int log_part_number(const std::string& path, const std::string& part);
+
+/// Those that exist, in order; `path` itself need not.
+std::vector<std::string> existing_log_parts(const std::string& path);
+
+/// Logs of this name that were moved aside when a later one took it, oldest first, with all their parts.
+std::vector<std::string> kept_logs(const std::string& path);
+
+/// The name for a log of `path` that is moved aside and ended at `time_s` (Unix): NAME.20261122T014503Z.lcm.
+std::string kept_name(const std::string& path, std::int64_t time_s);
+
+}  // namespace equipoise::runtime

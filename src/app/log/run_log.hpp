@@ -1,0 +1,49 @@
+// A run's log as ticks, one at a time. In: path -> out: what the run was, and per tick the record that was
+// handed over; InputError when the file is no log of ours. A tick counts when its sensors, command, states,
+// motors, health and timing are there. Not for the tick.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/log/log_reader.hpp"
+#include "equipoise/runtime/record.hpp"
+
+namespace equipoise::app {
+
+class RunLog {
+ public:
+  explicit RunLog(const std::string& path);
+  /// From the bytes of a log; `origin` names it in errors.
+  RunLog(const std::string& bytes, const std::string& origin);
+
+  const runtime::RunInfo& run() const { return run_; }
+  /// Next whole tick; false at the end.
+  bool next(runtime::TickRecord* tick);
+
+  /// So far. Names of TickRecord::others, in order; ticks that lack a message; bytes that belong to none.
+  const std::vector<std::string>& estimators() const { return estimators_; }
+  std::int64_t incomplete_ticks() const { return incomplete_ticks_; }
+  std::size_t damaged_bytes() const { return reader_.damaged_bytes(); }
+
+ private:
+  void find_run(LogReader reader, const std::string& origin);
+  bool finish(runtime::TickRecord* tick);
+  void take(const LogEvent& event);
+  void take_compared(const LogEvent& event);
+
+  LogReader reader_;
+  runtime::RunInfo run_;
+  std::vector<std::string> estimators_;
+  std::int64_t incomplete_ticks_ = 0;
+  runtime::TickRecord tick_{};
+  unsigned seen_ = 0;  // messages of tick_, as bits in the order of the field list
+  bool torn_ = false;  // one of them could not be decoded
+};
+
+Command command_of(const runtime::TickRecord& r) noexcept;
+
+/// "EQUIPOISE_STATE_EKF13" -> "state_ekf13".
+std::string short_name(std::string_view channel);
+
+}  // namespace equipoise::app

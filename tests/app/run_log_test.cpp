@@ -1,0 +1,230 @@
+#include "app/log/run_log.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <limits>
+#include <regex>
+#include <sstream>
+
+#include "app/cli/errors.hpp"
+#include "equipoise/runtime/wire.hpp"
+
+namespace equipoise::app {
+namespace {
+
+using runtime::Bytes;
+using runtime::TickRecord;
+namespace fields = runtime::fields;
+
+// "type name size" of each field, as the list has them.
+template <class Message, class Record>
+std::vector<std::string> listed(Message, Record record) {
+  std::vector<std::string> out{"int64_t utime 1"};
+  if (runtime::kHasTick<Message>) out.emplace_back("int64_t tick 1");
+  Message::visit(record, [&](const char* name, const char*, const auto& value) {
+    const auto line = [&](auto element, std::size_t count) {
+      using T = decltype(element);
+      const char* type = std::is_same_v<T, bool>          ? "boolean"
+                         : std::is_same_v<T, double>      ? "double"
+                         : std::is_same_v<T, std::string> ? "string"
+                         : sizeof(T) == 8                 ? "int64_t"
+                                                          : "int32_t";
+      out.push_back(std::string(type) + " " + name + " " + std::to_string(count));
+    };
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_arithmetic_v<Value> || std::is_same_v<Value, std::string>) {
+      line(value, 1);
+    } else {
+      line(value[0], std::size(value));
+    }
+  });
+  return out;
+}
+
+// The same from lcm/TYPE.lcm.
+std::vector<std::string> declared(const std::string& type) {
+  std::ifstream file(std::string(EQUIPOISE_SOURCE_DIR) + "/lcm/" + type + ".lcm");
+  std::vector<std::string> out;
+  const std::regex field(R"(^\s*(\w+)\s+(\w+)(?:\[(\d+)\])?;.*)");
+  std::smatch match;
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("package", 0) == 0 || !std::regex_match(line, match, field)) continue;
+    out.push_back(match[1].str() + " " + match[2].str() + " " + (match[3].matched ? match[3].str() : "1"));
+  }
+  return out;
+}
+
+template <class Message, class Record>
+void expect_same_layout(Message message, const Record& record) {
+  EXPECT_EQ(listed(message, record), declared(Message::kType)) << Message::kType;
+}
+
+// A different value in every place.
+struct Distinct {
+  double next = 1.0;
+  template <class T>
+  void operator()(const char*, const char*, T& value) {
+    if constexpr (std::is_same_v<T, std::string>) {
+      value = "text " + std::to_string(next++);
+    } else if constexpr (std::is_same_v<T, bool>) {
+      value = !value;
+    } else if constexpr (std::is_arithmetic_v<T>) {
+      value = static_cast<T>(sizeof(T) == 8 ? -1e15 * next++ : 1e6 * next++);
+    } else {
+      for (auto& element : value) (*this)("", "", element);
+    }
+  }
+};
+
+// lcm-gen's class decodes what the list encodes, and encodes the same again.
+template <class Generated, class Message, class Record>
+void expect_generated_code_agrees(Message message, Record record) {
+  Distinct distinct;
+  Message::visit(record, distinct);
+  Bytes bytes;
+  runtime::encode(message, record, 123456789012, 77, &bytes);
+  Generated generated;
+  const int size = static_cast<int>(bytes.size());
+  ASSERT_EQ(generated.decode(bytes.data(), 0, size), size) << Message::kType;
+  Bytes again(bytes.size());
+  EXPECT_EQ(generated.encode(again.data(), 0, size), size);
+  EXPECT_EQ(again, bytes) << Message::kType;
+  EXPECT_EQ(generated.utime, 123456789012);
+
+  Record back{};
+  std::int64_t utime = 0;
+  std::int64_t tick = 0;
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  ASSERT_TRUE(runtime::decode(message, text, &back, &utime, &tick));
+  Bytes third;
+  runtime::encode(message, back, utime, 77, &third);
+  EXPECT_EQ(third, bytes);
+  EXPECT_FALSE(runtime::decode(message, text.substr(0, text.size() - 1), &back, &utime, &tick));
+}
+
+std::string event(std::string_view channel, const Bytes& data) {
+  std::string out("\xED\xA1\xDA\x01", 4);
+  const auto put = [&out](std::uint64_t value, unsigned bytes) {
+    for (unsigned i = bytes; i-- > 0;) out += static_cast<char>(value >> (8 * i));
+  };
+  put(0, 8);
+  put(0, 8);
+  put(channel.size(), 4);
+  put(data.size(), 4);
+  return out.append(channel).append(data.begin(), data.end());
+}
+
+// The messages of one tick, and of an estimator beside it.
+std::string tick_events(std::int64_t tick, const std::string& without = "") {
+  TickRecord r{};
+  r.truth.theta_rad[0] = 0.25;
+  r.others[0].theta_rad[0] = 0.5;
+  std::string out;
+  Bytes bytes;
+  const auto add = [&](auto message, const char* channel, const auto& record) {
+    runtime::encode(message, record, 5000 * tick, tick, &bytes);
+    if (without != channel) out += event(channel, bytes);
+  };
+  fields::each_message(r, add);
+  add(fields::State{}, "EQUIPOISE_STATE_EKF13", r.others[0]);
+  add(fields::State{}, fields::kTruthChannel, r.truth);
+  return out;
+}
+
+Bytes run_message() {
+  runtime::RunInfo run;
+  run.robot = "mbbr";
+  run.config_toml = "a = 1";
+  Bytes bytes;
+  runtime::encode(fields::Run{}, run, 0, 0, &bytes);
+  return bytes;
+}
+
+std::string run_event() { return event(fields::kRunChannel, run_message()); }
+
+TEST(FieldList, IsWhatTheLcmTypesDeclare) {
+  const TickRecord none{};
+  fields::each_message(
+      none, [](auto message, const char*, const auto& record) { expect_same_layout(message, record); });
+  expect_same_layout(fields::Histogram{}, fields::HistogramRecord{});
+  expect_same_layout(fields::Run{}, runtime::RunInfo{});
+}
+
+TEST(FieldList, EncodesWhatGeneratedCodeDecodes) {
+  expect_generated_code_agrees<sensors_t>(fields::Sensors{}, TickRecord{});
+  expect_generated_code_agrees<command_t>(fields::CommandFields{}, TickRecord{});
+  expect_generated_code_agrees<state_t>(fields::State{}, runtime::StateRecord{});
+  expect_generated_code_agrees<motors_t>(fields::Motors{}, TickRecord{});
+  expect_generated_code_agrees<health_t>(fields::Health{}, TickRecord{});
+  expect_generated_code_agrees<timing_t>(fields::Timing{}, TickRecord{});
+  expect_generated_code_agrees<timing_histogram_t>(fields::Histogram{}, fields::HistogramRecord{});
+  expect_generated_code_agrees<run_t>(fields::Run{}, runtime::RunInfo{});
+}
+
+TEST(FieldList, PutsEachFieldWhereTheGeneratedCodeLooksForIt) {
+  TickRecord r{};
+  r.raw.imu_temperature_degC = 41.5;
+  r.raw.health = 0x80000001U;
+  r.degraded = 5;
+  r.motors = 3;
+  r.battery_V = 7.25;
+  Bytes bytes;
+  sensors_t sensors{};
+  runtime::encode(fields::Sensors{}, r, 1, 2, &bytes);
+  sensors.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  EXPECT_EQ(sensors.imu_temperature_degC, 41.5);
+  EXPECT_EQ(static_cast<std::uint32_t>(sensors.health), 0x80000001U);
+  health_t health{};
+  runtime::encode(fields::Health{}, r, 1, 2, &bytes);
+  health.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  EXPECT_EQ(health.degraded, 5);
+  EXPECT_EQ(health.battery_V, 7.25);
+  motors_t motors{};
+  runtime::encode(fields::Motors{}, r, 1, 2, &bytes);
+  motors.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  EXPECT_EQ(motors.motors, 3);
+}
+
+TEST(RunLog, ATickThatLacksAMessageIsCountedAndLeftOut) {
+  RunLog log(run_event() + tick_events(0) + tick_events(1, "EQUIPOISE_MOTORS") + tick_events(2), "a.lcm");
+  std::vector<std::int64_t> ticks;
+  for (TickRecord tick; log.next(&tick);) {
+    ticks.push_back(tick.tick);
+    EXPECT_EQ(tick.now_ns, 5000000 * tick.tick);
+    EXPECT_TRUE(tick.has_truth);
+    EXPECT_EQ(tick.truth.theta_rad[0], 0.25);
+    EXPECT_EQ(tick.compared, 1U);
+    EXPECT_EQ(tick.others[0].theta_rad[0], 0.5);
+  }
+  EXPECT_THAT(ticks, testing::ElementsAre(0, 2));
+  EXPECT_EQ(log.incomplete_ticks(), 1);
+  EXPECT_THAT(log.estimators(), testing::ElementsAre("ekf13"));
+  EXPECT_EQ(log.run().config_toml, "a = 1");
+}
+
+TEST(RunLog, DamageBetweenEventsIsSkippedAndCounted) {
+  const std::string noise(700000, 'x');  // more than one read
+  RunLog log(noise + run_event() + tick_events(0) + noise + tick_events(1) + "\xED\xA1\xDA", "a.lcm");
+  int ticks = 0;
+  for (TickRecord tick; log.next(&tick);) ++ticks;
+  EXPECT_EQ(ticks, 2);
+  EXPECT_EQ(log.damaged_bytes(), 2 * noise.size() + 3);
+}
+
+// Found by fuzzing: a length that counts no end.
+TEST(RunLog, AStringWithoutRoomForItsEndIsRefused) {
+  constexpr std::size_t kRobotLength = 32;  // fingerprint, utime, seed, rolling radius come before
+  Bytes bytes = run_message();
+  ASSERT_EQ(bytes[kRobotLength + 3], 5U);
+  for (const std::int32_t length : {0, -1, -5, std::numeric_limits<std::int32_t>::min()}) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      bytes[kRobotLength + i] = static_cast<std::uint8_t>(static_cast<std::uint32_t>(length) >> (24 - 8 * i));
+    }
+    EXPECT_THROW(RunLog(event(fields::kRunChannel, bytes), "a.lcm"), InputError) << length;
+  }
+}
+
+}  // namespace
+}  // namespace equipoise::app

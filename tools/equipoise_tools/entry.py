@@ -1,0 +1,19 @@
+"""How a command of this package ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+
+
+def leave(main: Callable[[], int | None]) -> None:
+    """Runs main and exits with its status; quietly, as Unix commands do, when nobody reads on (`| head`)."""
+    try:
+        status = main()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing is left to complain at exit
+        status = 128 + signal.SIGPIPE
+    sys.exit(status)
