@@ -85,7 +85,7 @@ def test_files_of_the_page_are_in_the_repository_or_the_package(root):
     for link in re.findall(r"\]\((\.\./[^)]+)\)", text):
         assert (root / "docs" / link).exists(), link
     script = (root / "tools/package").read_text()
-    assert "lib/firmware/equipoise-$overlay.dtbo" in script
+    assert "lib/firmware/equipoise-$overlay-${cells}cell.dtbo" in script
     for overlay in set(re.findall(r"/lib/firmware/equipoise-(\w+)\.dtbo", text)):
         assert (root / f"packaging/equipoise-{overlay}.dts").exists()
     for config in set(re.findall(r"/etc/equipoise/([\w/]+\.toml)", text)):

@@ -15,6 +15,13 @@ install_package() {
     -o Dpkg::Options::=--force-confold "$store/$1" >&2 && equipoise --version >&2
 }
 
+# What the boot loader applies must fit the running kernel's pin controller.
+choose_overlays() {
+  [ -x /usr/lib/equipoise/choose-overlays ] || return 0
+  cells=$(as_root /usr/lib/equipoise/choose-overlays) || return 1
+  [ -z "$cells" ] || say "device-tree overlays for #pinctrl-cells = <$cells>"
+}
+
 # A robot that flies is not touched: the package would stop it in the air.
 if service_runs && [ "${FORCE:-no}" != yes ]; then
   say "equipoise.service is running; stop it first (sudo systemctl stop equipoise) or use --force"
@@ -55,5 +62,6 @@ rollback)
   fi
   ;;
 esac
+choose_overlays || status=1
 if [ "$restart" = yes ]; then as_root systemctl start equipoise.service || status=1; fi
 exit "$status"

@@ -8,6 +8,14 @@ machine_mirror() {
     awk '$1 == "Debian" && $2 !~ /-/ { print $3; exit }'
 }
 
+# security_mirror: where it fetches Debian's security updates from, else from the mirror's neighbour.
+security_mirror() {
+  local found
+  found=$(apt-get indextargets --format '$(CODENAME) $(REPO_URI)' 'Created-By: Packages' |
+    awk '$1 ~ /-security$/ { print $2; exit }')
+  printf '%s\n' "${found:-$(machine_mirror | sed 's|/debian/*$|/debian-security|')}"
+}
+
 # foreign_apt ARCHITECTURE SUITE APT-GET-ARGUMENTS...: apt-get in the private root of that pair.
 foreign_apt() {
   local architecture=$1 suite=$2 apt_root

@@ -10,7 +10,7 @@ prepare_can_machine() {
   local image version stamp=$vm/can-kernel.stamp
   [ "$(dpkg --print-architecture)" = amd64 ] || die "the CAN machine needs an amd64 host"
   if [ ! -f "$stamp" ] || [ ! -d "$vm/can-headers" ]; then
-    image=$(image_of amd64 linux-image-amd64)
+    image=$(package_of bookworm amd64 linux-image-amd64)
     version=${image#linux-image-}
     download_only amd64 "$image" "linux-headers-$version" "linux-headers-${version%-amd64}-common" linux-kbuild-6.1 \
       busybox-static
@@ -33,7 +33,7 @@ build_can_modules() {
   prepare_source
   rm -rf "$can_modules"
   mkdir -p "$can_modules"
-  cp "$source"/* "$vm/source/drivers/net/can/sja1000/sja1000.h" "$can_modules/"
+  cp "$source"/* "$vm/source-bookworm/drivers/net/can/sja1000/sja1000.h" "$can_modules/"
   make_modules "$vm/can-headers" "$can_kernel_version" "$can_modules"
   printf '%s\n' "$wanted" >"$stamp"
 }

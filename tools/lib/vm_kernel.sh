@@ -10,7 +10,7 @@ prepare_kernel() {
   local image stamp=$vm/kernel.stamp
   if [ ! -f "$stamp" ]; then
     rm -rf "$vm/debs" "$kernel_tree" "$vm/headers"
-    image=$(image_of armhf linux-image-rt-armmp)
+    image=$(package_of bookworm armhf linux-image-rt-armmp)
     local version=${image#linux-image-} flavour
     flavour=${version%-rt-armmp}
     download_only armhf "$image" "linux-headers-$version" "linux-headers-$flavour-common-rt" busybox-static
@@ -25,11 +25,11 @@ prepare_kernel() {
 
 # Debian's kernel has no counter subsystem and no gpio-sim; they build as modules against its headers.
 collect_module_sources() {
-  local drivers=$vm/source/drivers
+  local drivers=$vm/source-bookworm/drivers
   mkdir -p "$modules_built"
   cp "$drivers"/counter/counter-{core,sysfs,chrdev}.c "$drivers"/counter/counter-*.h "$modules_built/"
   cp "$drivers"/gpio/gpio-sim.c "$drivers"/gpio/gpiolib.h "$modules_built/"
-  cp "$vm/source/kernel/irq/irq_sim.c" "$modules_built/"
+  cp "$vm/source-bookworm/kernel/irq/irq_sim.c" "$modules_built/"
   cp "$root"/tests/hardware/kernel/{Kbuild,*.[ch]} "$modules_built/"
   # What irq_sim calls is exported to built-in code only; this is its exported equivalent.
   sed -i 's/handle_simple_irq(irq_to_desc(irqnum))/generic_handle_irq(irqnum)/' "$modules_built/irq_sim.c"

@@ -19,36 +19,44 @@ unpack() { # DIRECTORY DEB...
   for file in "$@"; do dpkg-deb --fsys-tarfile "$file" | tar -x -C "$target" --no-same-owner; done
 }
 
-# image_of ARCHITECTURE METAPACKAGE: the kernel package it stands for today.
-image_of() {
-  local image
-  foreign_apt "$1" bookworm --version >/dev/null # makes the private root
-  image=$(APT_CONFIG=$root/build/apt/bookworm-$1/apt.conf apt-cache depends "$2" |
-    awk '/Depends: linux-image/ { print $2; exit }')
-  [ -n "$image" ] || die "the archive has no $2"
-  printf '%s\n' "$image"
+# package_of SUITE ARCHITECTURE METAPACKAGE: the package of a kernel's version it stands for today.
+package_of() {
+  local package
+  foreign_apt "$2" "$1" --version >/dev/null # makes the private root
+  package=$(APT_CONFIG=$root/build/apt/$1-$2/apt.conf apt-cache depends "$3" |
+    awk '/Depends: linux-/ { print $2; exit }')
+  [ -n "$package" ] || die "the archive has no $3"
+  printf '%s\n' "$package"
 }
 
-# prepare_source: of the kernel's source, in build/vm/source, what modules and the board's device tree are made of.
+# prepare_source [SUITE]: of a release's kernel source, in $vm/source-SUITE, what modules and the boards' device trees are
+# made of. Debian moved the trees to ti/omap in between.
 prepare_source() {
-  local stamp=$vm/source.stamp parts=('drivers/gpio/*.[ch]' 'kernel/irq/irq_sim.c' 'drivers/counter/*.[ch]'
-    'drivers/net/can/sja1000/*.h' 'arch/arm/boot/dts/am33*' 'arch/arm/boot/dts/tps65217.dtsi' 'include/dt-bindings/*'
+  local suite=${1:-bookworm} source package archive parts stamp
+  source=$vm/source-$suite
+  stamp=$source.stamp
+  parts=('drivers/gpio/*.[ch]' 'kernel/irq/irq_sim.c' 'drivers/counter/*.[ch]'
+    'drivers/net/can/sja1000/*.h' 'arch/arm/boot/dts/*am33*' 'arch/arm/boot/dts/*tps65217*' 'include/dt-bindings/*'
     'include/uapi/linux/input-event-codes.h')
   [ "$(cat "$stamp" 2>/dev/null)" != "${parts[*]}" ] || return 0
-  download_only armhf linux-source-6.1
-  rm -rf "$vm/source"
-  unpack "$vm/source" "$vm/debs"/linux-source-6.1_*.deb
-  tar -xJf "$vm/source/usr/src/linux-source-6.1.tar.xz" -C "$vm/source" --strip-components=1 --wildcards "${parts[@]/#/*/}"
-  rm -rf "$vm/source/usr" "$vm/debs"/linux-source-*.deb
+  package=$(package_of "$suite" armhf linux-source)
+  rm -rf "$source" "$source.deb"
+  mkdir -p "$source.deb" "$source"
+  (cd "$source.deb" && foreign_apt armhf "$suite" download "$package" >&2) || die "could not download $package of $suite"
+  unpack "$source.deb" "$source.deb/$package"_*.deb
+  archive=$source.deb/usr/src/$package.tar.xz
+  tar -xJf "$archive" -C "$source" --strip-components=1 --wildcards "${parts[@]/#/*/}"
+  rm -rf "$source.deb"
   printf '%s\n' "${parts[*]}" >"$stamp"
 }
 
-# board_tree OUTPUT: the BeagleBone Black's device tree with symbols, which that of Debian's kernel packages lacks.
+# board_tree SUITE BOARD OUTPUT: the tree of am335x-BOARD with symbols, which that of Debian's kernel packages lacks.
 board_tree() {
-  local trees=$vm/source/arch/arm/boot/dts
-  prepare_source
-  cpp -nostdinc -undef -x assembler-with-cpp -I "$vm/source/include" "$trees/am335x-boneblack.dts" "$1.dts"
-  dtc -q -@ -I dts -O dtb -i "$trees" -o "$1" "$1.dts"
+  local source=$vm/source-$1 tree
+  prepare_source "$1"
+  tree=$(find "$source/arch/arm/boot/dts" -name "am335x-$2.dts")
+  cpp -nostdinc -undef -x assembler-with-cpp -I "$source/include" -I "${tree%/*}" "$tree" "$3.dts"
+  dtc -q -@ -I dts -O dtb -i "${tree%/*}" -o "$3" "$3.dts"
 }
 
 # make_modules HEADERS VERSION DIRECTORY VARIABLE=VALUE...: builds DIRECTORY's modules against Debian's unpacked headers.
