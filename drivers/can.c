@@ -10,13 +10,19 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "sysfs.h"
+
 enum { ERROR_FRAMES_PER_CALL = 64 };
 
 static int check_interface(int fd, const char* interface, int* index) {
   struct ifreq request;
   memset(&request, 0, sizeof request);
-  if (strlen(interface) >= sizeof request.ifr_name) return -ENODEV;
-  memcpy(request.ifr_name, interface, strlen(interface));
+  /* DCAN1 alone is can0, beside DCAN0 can1: its address says which. */
+  char dir[SYSFS_PATH_MAX];
+  const char* name = interface;
+  if (sysfs_find("/sys/class/net", "", interface, dir) == 0) name = strrchr(dir, '/') + 1;
+  if (strlen(name) >= sizeof request.ifr_name) return -ENODEV;
+  memcpy(request.ifr_name, name, strlen(name));
   if (ioctl(fd, SIOCGIFINDEX, &request) < 0) return -errno;
   *index = request.ifr_ifindex;
   if (ioctl(fd, SIOCGIFFLAGS, &request) < 0) return -errno;

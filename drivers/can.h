@@ -1,7 +1,7 @@
 /* can.h: classic CAN through a SocketCAN raw socket, never blocking, with the bus state from error frames.
- * In: interface name, frames. Out: frames; 0 or -errno. A full transmit queue (-ENOBUFS) is normal under
- * load: the frame is counted and dropped. D_CAN of the AM335x is classic CAN only, so FD frames are not
- * enabled. */
+ * In: the controller's address ("481d0000") or its interface's name, frames. Out: frames; 0 or -errno. A full
+ * transmit queue (-ENOBUFS) is normal under load: the frame is counted and dropped. D_CAN of the AM335x is
+ * classic CAN only, so FD frames are not enabled. */
 #ifndef EQUIPOISE_DRIVERS_CAN_H
 #define EQUIPOISE_DRIVERS_CAN_H
 
@@ -24,7 +24,8 @@ typedef struct can_port {
   uint32_t rx_overruns; /* frames the controller lost */
 } can_port_t;
 
-int can_open(can_port_t* port, const char* interface); /* -ENODEV: no such interface; -ENETDOWN: not up */
+/* -ENODEV: no such interface; -ENETDOWN: not up */
+int can_open(can_port_t* port, const char* interface);
 
 /* -ENOBUFS or -EAGAIN: dropped and counted; -ENETDOWN: interface down; -EINVAL: longer than 8 bytes. While
  * the bus is off the kernel drops what it takes: the state tells. */

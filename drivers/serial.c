@@ -2,8 +2,12 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
 #include <termios.h>
 #include <unistd.h>
+
+#include "sysfs.h"
 
 static int speed_of(uint32_t baud, speed_t* out) {
   static const struct {
@@ -20,10 +24,24 @@ static int speed_of(uint32_t baud, speed_t* out) {
   return -EINVAL;
 }
 
-int serial_open(serial_t* serial, const char* path, uint32_t baud) {
+/* UART1 is ttyS1, ttyO1 or, where only it is enabled, ttyS0: its address says which. */
+static int path_of(char out[SYSFS_PATH_MAX], const char* port) {
+  if (port[0] == '/') {
+    const int n = snprintf(out, SYSFS_PATH_MAX, "%s", port);
+    return n >= SYSFS_PATH_MAX ? -ENAMETOOLONG : 0;
+  }
+  char dir[SYSFS_PATH_MAX];
+  const int status = sysfs_find("/sys/class/tty", "tty", port, dir);
+  return status < 0 ? status : sysfs_join(out, "/dev", strrchr(dir, '/') + 1);
+}
+
+int serial_open(serial_t* serial, const char* port, uint32_t baud) {
   serial->fd = -1;
   speed_t speed = B0;
   if (speed_of(baud, &speed) < 0) return -EINVAL;
+  char path[SYSFS_PATH_MAX];
+  const int found = path_of(path, port);
+  if (found < 0) return found;
   serial->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (serial->fd < 0) return -errno;
   struct termios raw;

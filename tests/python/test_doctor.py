@@ -30,6 +30,19 @@ PADS = {
 }
 
 
+# Who claims them: the devices, and the pin controller what are plain lines.
+OWNERS = {
+    **dict.fromkeys(PADS, "44e10800.pinmux"),
+    **dict.fromkeys((0x980, 0x984), "48022000.serial"),
+    **dict.fromkeys((0x978, 0x97C), "4819c000.i2c"),
+    **dict.fromkeys((0x848, 0x84C), "48302200.pwm"),
+    0x820: "48304200.pwm",
+    **dict.fromkeys((0x9A0, 0x9A4), "48300180.counter"),
+    **dict.fromkeys((0x8D0, 0x8D4), "48302180.counter"),
+    **dict.fromkeys((0x830, 0x834), "48304180.counter"),
+}
+
+
 def write(path: Path, text: str = "") -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
@@ -43,6 +56,20 @@ def device(root: Path, bus: str, path: str, attributes: dict[str, str]) -> None:
     link = root / "sys" / bus / place.name
     link.parent.mkdir(parents=True, exist_ok=True)
     link.symlink_to(os.path.relpath(place, link.parent))
+
+
+def thread(root: Path, number: int, name: str, priority: int) -> None:
+    write(root / f"proc/{number}/comm", f"{name}\n")
+    write(root / f"proc/{number}/stat", f"{number} ({name}) S " + "0 " * 36 + f"{priority} 1 0\n")
+
+
+def owners(root: Path, names: dict[int, str]) -> None:
+    lines = [
+        f"pin {(at - 0x800) // 4} (PIN{(at - 0x800) // 4}): {name} (GPIO UNCLAIMED) function a group b\n"
+        for at, name in names.items()
+    ]
+    lines.append("pin 141 (PIN141): (MUX UNCLAIMED) (GPIO UNCLAIMED)\n")
+    write(root / "sys/kernel/debug/pinctrl/44e10800.pinmux-pinctrl-single/pinmux-pins", "".join(lines))
 
 
 def pads(root: Path, values: dict[int, int]) -> None:
@@ -62,7 +89,25 @@ def robot(tmp_path) -> Path:
     write(root / "proc/version", "Linux version 6.1.46-bone-rt-r14 #1 PREEMPT_RT\n")
     write(root / "sys/kernel/realtime", "1\n")
     write(root / "proc/device-tree/model", "TI AM335x BeagleBone Black\0")
-    write(root / "proc/device-tree/chosen/overlays/equipoise-cape.kernel")
+    write(root / "proc/device-tree/chosen/overlays/equipoise-cape.kernel", "pinctrl-cells 1\0")
+    write(root / "proc/device-tree/ocp/scm@0/pinmux@800/#pinctrl-cells", "\0\0\0\1")
+    for name in ("", "-1cell"):
+        write(root / f"lib/firmware/equipoise-cape{name}.dtbo", "one")
+    write(root / "lib/firmware/equipoise-cape-2cell.dtbo", "two")
+    write(
+        root / "boot/uEnv.txt",
+        "disable_uboot_overlay_video=1\ndisable_uboot_overlay_audio=1\n#enable_uboot_cape_universal=1\n",
+    )
+    for name, value in (("state", "active"), ("identity", "OMAP Watchdog"), ("timeout", "5")):
+        write(root / f"sys/class/watchdog/watchdog0/{name}", f"{value}\n")
+    for number, name, priority in (
+        (50, "irq/45-4819c000", 70),
+        (51, "irq/44-481ae000", 70),
+        (52, "irq/60-4a100000", 50),
+    ):
+        thread(root, number, name, priority)
+    device(root, "class/tty", "48022000.serial/tty/ttyO1", {"dev": "251:1"})
+    device(root, "class/tty", "481aa000.serial/tty/ttyO5", {"dev": "251:5"})
     write(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", "dmtimer\n")
     limits = "Max realtime priority     {0}                   {0}\n"
     write(
@@ -84,9 +129,10 @@ def robot(tmp_path) -> Path:
     for address, number in GPIO.items():
         device(root, "bus/gpio/devices", f"{address}.gpio/gpiochip{number}", {"label": address})
         write(root / f"dev/gpiochip{number}")
-    for name in ("cpu_dma_latency", "ttyS1"):
+    for name in ("cpu_dma_latency", "ttyO1", "ttyO5"):
         write(root / "dev" / name)
     pads(root, PADS)
+    owners(root, OWNERS)
     return root
 
 
@@ -119,9 +165,16 @@ BREAKS = {  # what breaks it: (check, verdict, in what is wrong, in the fix)
     "sys/kernel/realtime": ("kernel.preempt_rt", "warn", "not PREEMPT_RT", "bone-rt"),
     "sys/class/pwm/pwmchip7": ("pwm.3", "fail", "no EHRPWM at 48304200", "uboot_overlay_addr4"),
     "sys/bus/counter/devices/counter1": ("encoder.2", "fail", "no eQEP at 48302180", "uboot_overlay_addr4"),
-    "sys/bus/iio/devices/iio:device0": ("battery.adc", "fail", "no ADC", "uboot_overlay_addr4"),
+    "sys/bus/iio/devices/iio:device0": ("battery.adc", "fail", "no ADC", "equipoise-cape.dtbo"),
     "sys/bus/gpio/devices/gpiochip3": ("gpio.481ae000.21", "fail", "[imu] interrupt", "gpiodetect"),
-    "dev/ttyS1": ("serial", "warn", "No such file", "reboot"),
+    "dev/ttyO1": ("serial", "warn", "/dev/ttyO1: No such file", "reboot"),
+    "sys/class/tty/ttyO1": ("serial", "warn", "no UART at 48022000", "uboot_overlay_addr4"),
+    "sys/class/watchdog/watchdog0/state": (
+        "kernel.watchdog",
+        "warn",
+        "no hardware watchdog",
+        "modprobe omap_wdt",
+    ),
     "proc/net/route": ("lcm.route", "warn", "no route to 239.255.76.67", "ip route add 224.0.0.0/4 dev lo"),
     "dev/cpu_dma_latency": ("limits.cpu_idle", "warn", "deep idle", "adduser"),
     "proc/device-tree/chosen/overlays/equipoise-cape.kernel": (
@@ -177,23 +230,104 @@ def test_without_debugfs_the_pins_are_not_guessed(root, robot):
 
 def with_can(root, tmp_path, device) -> Path:
     text = (root / "config/boards/robotics_cape_mbbr.toml").read_text()
-    text = re.sub(r'interface = ""', 'interface = "can1"', text).replace("/dev/ttyS1", device)
+    text = re.sub(r'interface = ""', 'interface = "481d0000"', text)
+    text = text.replace('device = "48022000"', f'device = "{device}"')
     write(tmp_path / "can.toml", text)
     return tmp_path / "can.toml"
 
 
 def test_can_needs_its_overlay_its_pins_and_a_bit_rate(root, robot, tmp_path):
-    checks, _ = examine(root, robot, board=with_can(root, tmp_path, "/dev/ttyS1"))
-    assert "share P9.24" in checks["can"]["what"] and "ttyS5" in checks["can"]["fix"]
-    board = with_can(root, tmp_path, "/dev/ttyS5")
+    checks, _ = examine(root, robot, board=with_can(root, tmp_path, "48022000"))
+    assert "share P9.24" in checks["can"]["what"] and "481aa000" in checks["can"]["fix"]
+    board = with_can(root, tmp_path, "481aa000")
     checks, _ = examine(root, robot, board=board)
     assert checks["can"]["verdict"] == "fail" and "equipoise-can.dtbo" in checks["can"]["fix"]
-    write(robot / "sys/class/net/can1/operstate", "down\n")
+    assert checks["serial"]["what"] == "481aa000: /dev/ttyO5 opens"
+    device(robot, "class/net", "481d0000.can/net/can0", {"operstate": "down\n"})  # alone it is the first
     checks, _ = examine(root, robot, board=board)
-    assert checks["can"]["fix"] == "sudo ip link set can1 up type can bitrate 500000 restart-ms 100"
-    write(robot / "sys/class/net/can1/operstate", "up\n")
+    assert checks["can"]["fix"] == "sudo ip link set can0 up type can bitrate 500000 restart-ms 100"
+    write(robot / "sys/class/net/can0/operstate", "up\n")
     checks, _ = examine(root, robot, board=board)
     assert checks["can"]["verdict"] == "ok"
+
+
+@pytest.mark.parametrize(
+    ("line", "replacement", "check"),
+    [
+        ("disable_uboot_overlay_video=1", "#disable_uboot_overlay_video=1", "uenv.video"),
+        ("disable_uboot_overlay_audio=1\n", "", "uenv.audio"),
+        ("#enable_uboot_cape_universal=1", "enable_uboot_cape_universal=1", "uenv.cape_universal"),
+    ],
+)
+def test_the_boot_loaders_file_must_leave_the_pads_to_us(root, robot, line, replacement, check):
+    file = robot / "boot/uEnv.txt"
+    assert examine(root, robot)[0][check]["verdict"] == "ok"
+    file.write_text(file.read_text().replace(line, replacement))
+    found = examine(root, robot)[0][check]
+    assert found["verdict"] == "fail"
+    # The command does what it says, on this file.
+    command = (
+        found["fix"].removesuffix(" && sudo reboot").replace("sudo ", "").replace("/boot/uEnv.txt", str(file))
+    )
+    subprocess.run(["sh", "-c", command], check=True, capture_output=True)
+    assert examine(root, robot)[0][check]["verdict"] == "ok"
+
+
+def test_an_overlay_for_the_other_kind_of_pin_controller_is_found(root, robot):
+    assert examine(root, robot)[0]["device_tree.twin"]["verdict"] == "ok"
+    write(robot / "proc/device-tree/ocp/scm@0/pinmux@800/#pinctrl-cells", "\0\0\0\2")  # another kernel
+    checks, _ = examine(root, robot)
+    assert {"device_tree.cells", "device_tree.twin"} <= set(failing(checks))
+    assert "#pinctrl-cells = <2>" in checks["device_tree.cells"]["what"]
+    assert "choose-overlays" in checks["device_tree.twin"]["fix"]
+
+
+def test_a_pad_that_belongs_to_somebody_else_is_found(root, robot):
+    owners(robot, {**OWNERS, 0x8AC: "tda998x", 0x848: "hog"})
+    checks, _ = examine(root, robot)
+    assert checks["owner.P8.44"]["what"] == "motor 3 in1: its pad belongs to tda998x"
+    assert checks["owner.P9.14"]["verdict"] == "fail"
+    owners(robot, {at: name for at, name in OWNERS.items() if at != 0x9AC})
+    assert "nobody has claimed" in examine(root, robot)[0]["owner.P9.25"]["what"]
+
+
+def test_interrupts_of_the_sample_come_first(root, robot):
+    assert examine(root, robot)[0]["kernel.irq_threads"]["verdict"] == "ok"
+    thread(robot, 51, "irq/44-481ae000.gpio", 50)
+    found = examine(root, robot)[0]["kernel.irq_threads"]
+    assert found["verdict"] == "warn" and "481ae000" in found["what"] and "real-time-machine" in found["fix"]
+
+
+def test_a_watchdog_that_nobody_started_is_found(root, robot):
+    write(robot / "sys/class/watchdog/watchdog0/state", "inactive\n")
+    found = examine(root, robot)[0]["kernel.watchdog"]
+    assert found["verdict"] == "warn" and "RuntimeWatchdogSec=5" in found["fix"]
+
+
+def test_the_governor_has_a_fix(root, robot):
+    write(robot / "sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "schedutil\n")
+    assert examine(root, robot)[0]["kernel.cpu_frequency"]["verdict"] == "warn"
+
+
+def test_the_report_holds_what_a_helper_needs_and_no_key(root, robot, tmp_path):
+    key = tmp_path / "key"
+    subprocess.run([root / "build/host/equipoise", "keygen", key], check=True, capture_output=True)
+    examine(root, robot, "--command-key", key, "--report", tmp_path / "report.txt")
+    text = (tmp_path / "report.txt").read_text()
+    for piece in (
+        "fail imu.bus: /dev/i2c-2",
+        "Linux version 6.1.46-bone-rt-r14",
+        "disable_uboot_overlay_video=1",
+        "48302200.pwm (GPIO UNCLAIMED)",
+        "(irq/45-4819c000) S",
+        'robot = "mbbr"',
+        "equipoise-cape.kernel",
+    ):
+        assert piece in text, piece
+    assert all(word not in text for word in key.read_text().split())
+    command = [root / "build/host/equipoise", "doctor", "--report", tmp_path / "none/report.txt"]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 2 and "cannot be written" in ended.stderr
 
 
 def test_a_key_that_others_can_read_fails(root, robot, tmp_path):
@@ -212,8 +346,10 @@ def test_a_laptop_gets_an_answer_not_a_crash(root, tmp_path):
     assert not failing(checks)
     assert checks["device_tree.model"]["what"] == "no device tree: a machine for simulation, not a robot"
     checks, _ = examine(root, tmp_path)
-    assert checks["device_tree.model"]["verdict"] == "fail"
-    assert checks["board"]["verdict"] == "skipped"
+    assert not failing(checks)
+    assert "without an error" in checks["board"]["what"] and "on the robot" in checks["board"]["fix"]
+    write(tmp_path / "proc/device-tree/model", "Another Board\0")
+    assert "device_tree.model" in failing(examine(root, tmp_path)[0])
 
 
 def test_every_finding_that_is_not_fine_says_what_to_do(root, tmp_path, robot):

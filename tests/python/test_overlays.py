@@ -1,6 +1,6 @@
 """The device-tree overlays on the boards' own trees, as the boot loader applies them.
-Debian's are compiled from its kernels' source by tools/cross-test; of BeagleBoard.org's, tests/data/device_tree
-holds what is about pads."""
+Debian's are compiled from its kernels' source by tools/cross-test; of BeagleBoard.org's what is about pads is
+in tests/data/device_tree."""
 
 import subprocess
 

@@ -17,8 +17,9 @@ constexpr const char* kGpio1 = "4804c000";
 constexpr const char* kGpio2 = "481ac000";
 constexpr const char* kGpio3 = "481ae000";
 
-// Lines of the robots' headers and their neighbours.
-constexpr std::array<GpioPad, 30> kGpioPads{{
+// Lines of the robots' headers and their neighbours; a pad that no header has goes by its ball's name.
+constexpr std::array<GpioPad, 33> kGpioPads{{
+    {kGpio0, 10, "P8.31", 0x8d8}, {kGpio0, 11, "P8.32", 0x8dc}, {kGpio2, 0, "gpmc_csn3", 0x888},
     {kGpio0, 20, "P9.41", 0x9b4}, {kGpio0, 22, "P8.19", 0x820}, {kGpio0, 23, "P8.13", 0x824},
     {kGpio0, 26, "P8.14", 0x828}, {kGpio0, 27, "P8.17", 0x82c}, {kGpio0, 30, "P9.11", 0x870},
     {kGpio0, 31, "P9.13", 0x874}, {kGpio1, 12, "P8.12", 0x830}, {kGpio1, 13, "P8.11", 0x834},
@@ -46,11 +47,13 @@ std::vector<Pad> pads_of_encoder(const std::string& device) {
   return {};
 }
 
-std::vector<Pad> pads_of_port(const std::string& port) {
+std::vector<Pad> pads_of_port(const std::string& port, bool blue) {
   if (port == "/dev/i2c-2") return {{"P9.20", 0x978, 3, true}, {"P9.19", 0x97c, 3, true}};
-  if (port == "/dev/ttyS1") return {{"P9.26", 0x980, 0, true}, {"P9.24", 0x984, 0}};
-  if (port == "/dev/ttyS5") return {{"P8.37", 0x8c0, 4}, {"P8.38", 0x8c4, 4, true}};
-  if (port == "can1") return {{"P9.26", 0x980, 2}, {"P9.24", 0x984, 2, true}};
+  if (port == "48022000") return {{"P9.26", 0x980, 0, true}, {"P9.24", 0x984, 0}};
+  if (port == "481a8000") return {{"P9.11", 0x870, 6, true}};  // its transmitter is another robot's business
+  if (port == "481aa000") return {{"P8.37", 0x8c0, 4}, {"P8.38", 0x8c4, 4, true}};
+  if (port == "481d0000" && blue) return {{"uart0_ctsn", 0x968, 2}, {"uart0_rtsn", 0x96c, 2, true}};
+  if (port == "481d0000") return {{"P9.26", 0x980, 2}, {"P9.24", 0x984, 2, true}};
   return {};
 }
 

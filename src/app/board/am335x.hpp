@@ -20,11 +20,11 @@ struct Pad {
 constexpr std::uint32_t kPadGpio = 7;
 constexpr std::uint32_t kPadReceiver = 1U << 5;
 
-/// Pads of an EHRPWM channel ("48302200", 0), an eQEP ("48300180"), a bus or port ("/dev/i2c-2",
-/// "/dev/ttyS1", "can1"); empty: not known.
+/// Pads of an EHRPWM channel ("48302200", 0), an eQEP ("48300180"), a bus ("/dev/i2c-2"), a UART or CAN
+/// controller ("48022000", "481d0000"; the BeagleBone Blue's CAN is on other pads); empty: not known.
 std::vector<Pad> pads_of_pwm(const std::string& device, std::uint32_t channel);
 std::vector<Pad> pads_of_encoder(const std::string& device);
-std::vector<Pad> pads_of_port(const std::string& port);
+std::vector<Pad> pads_of_port(const std::string& port, bool blue = false);
 /// Pad of gpio line `line` of the chip at this address; empty: not on a header.
 std::vector<Pad> pads_of_gpio(const std::string& chip, std::uint32_t line, bool input);
 

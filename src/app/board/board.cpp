@@ -131,6 +131,9 @@ Board read_board(const Document& document) {
   Board board;
   Section about = root.table("board");
   board.robot = about.text("robot");
+  constexpr std::array<const char*, 3> kOverlays{"cape", "blue", "none"};
+  board.overlay =
+      about.has("overlay") ? kOverlays[about.choice("overlay", {"cape", "blue", "none"})] : "cape";
   if (about.has("calibration")) board.calibration_file = about.text("calibration");
   about.finish();
 

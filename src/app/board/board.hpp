@@ -16,7 +16,8 @@ struct BoardLine {
 };
 
 struct Board {
-  std::string robot;  // "mbbr" or "mip"
+  std::string robot;    // "mbbr" or "mip"
+  std::string overlay;  // of the device tree: "cape", "blue"; "none": the board's own tree has it all
   bbb_config_t wiring{};
   BoardLine led_red, led_green;
   std::vector<BoardLine> led_bars;
@@ -25,9 +26,9 @@ struct Board {
   double battery_V_per_count = 0.0;
   double battery_offset_V = 0.0;
   int dc_jack_channel = 0;
-  std::string serial_device;
+  std::string serial_device;  // address or path
   int serial_baud = 0;
-  std::string can_interface;  // empty: no CAN
+  std::string can_interface;  // address or name; empty: no CAN
   int can_bitrate = 0;
   std::array<double, 9> R_BS{};  // rows
   std::string calibration_file;  // of equipoise calibrate, beside the board file; empty: none

@@ -1,4 +1,5 @@
 // Devices that a board file names: IMU, counters, PWM, ADC, serial port, CAN.
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -114,7 +115,8 @@ void examine_encoder(const Patient& patient, Findings* findings, std::uint32_t i
     if (!legacy.empty() && may(legacy + "/position", F_OK)) file = legacy + "/enabled";
   }
   if (file.empty()) {
-    findings->fail(name, "no eQEP at " + device + ": driver or device tree node missing", kOverlayFix);
+    findings->fail(name, "no eQEP at " + device + ": driver or device tree node missing",
+                   overlay_fix(patient));
   } else if (!may(file, W_OK)) {
     findings->fail(name, file + ": " + reason(errno), kGroupFix);
   } else {
@@ -129,7 +131,7 @@ void examine_pwm(const Patient& patient, Findings* findings, std::uint32_t i) {
   std::int64_t channels = 0;
   if (chip.empty()) {
     findings->fail(name, std::string("no EHRPWM at ") + motor.pwm + ": driver or device tree node missing",
-                   kOverlayFix);
+                   overlay_fix(patient));
   } else if (sysfs_read_number(chip.c_str(), "npwm", &channels) < 0 || channels <= motor.pwm_channel) {
     findings->fail(name,
                    chip + " has " + std::to_string(channels) + " channels, needs channel " +
@@ -147,14 +149,14 @@ void examine_adc(const Patient& patient, Findings* findings) {
   const bbb_config_t& wiring = patient.board->wiring;
   const std::string device = find(patient, "/sys/bus/iio/devices", "iio:device", wiring.adc);
   if (device.empty()) {
-    findings->fail("battery.adc", std::string("no ADC named ") + wiring.adc, kOverlayFix);
+    findings->fail("battery.adc", std::string("no ADC named ") + wiring.adc, overlay_fix(patient));
     return;
   }
   const std::string attribute = "in_voltage" + std::to_string(wiring.battery_channel) + "_raw";
   std::int64_t counts = 0;
   const int status = sysfs_read_number(device.c_str(), attribute.c_str(), &counts);
   if (status < 0) {
-    findings->fail("battery.adc", device + "/" + attribute + ": " + reason(status), kOverlayFix);
+    findings->fail("battery.adc", device + "/" + attribute + ": " + reason(status), overlay_fix(patient));
     return;
   }
   const double volts =
@@ -171,39 +173,57 @@ void examine_adc(const Patient& patient, Findings* findings) {
 }
 
 void examine_serial(const Patient& patient, Findings* findings) {
-  const std::string device = patient.board->serial_device;
-  if (may(patient.path(device), R_OK | W_OK)) {
-    findings->ok("serial", device + " opens");
-  } else if (errno == EACCES) {
-    findings->warn("serial", device + ": " + reason(errno) + ": no remote control", kGroupFix);
+  const std::string& device = patient.board->serial_device;
+  if (device.empty()) {
+    findings->skip("serial", "not used by this board file");
+    return;
+  }
+  std::string path = patient.path(device);
+  if (device.front() != '/') {
+    const std::string tty = find(patient, "/sys/class/tty", "tty", device);
+    if (tty.empty()) {
+      findings->warn("serial", "no UART at " + device + ": no remote control", overlay_fix(patient));
+      return;
+    }
+    path = patient.path("/dev/" + tty.substr(tty.rfind('/') + 1));
+  }
+  const int fd = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (fd >= 0) {
+    close(fd);
+    findings->ok("serial", device + ": " + path.substr(patient.root.size()) + " opens");
   } else {
-    findings->warn("serial", device + ": " + reason(errno) + ": no remote control", kOverlayFix);
+    const int error = errno;
+    findings->warn("serial", path + ": " + reason(error) + ": no remote control",
+                   error == EACCES ? kGroupFix : overlay_fix(patient));
   }
 }
 
 void examine_can(const Patient& patient, Findings* findings) {
   const Board& board = *patient.board;
-  const std::string interface = board.can_interface;
-  if (interface.empty()) {
+  if (board.can_interface.empty()) {
     findings->skip("can", "not used by this board file");
     return;
   }
-  if (board.serial_device == "/dev/ttyS1") {
+  const bool blue = board.overlay == "blue";  // its CAN has pads and a transceiver of its own
+  if (board.serial_device == "48022000" && !blue) {
     findings->fail(
         "can", "DCAN1 and UART1 share P9.24 and P9.26",
-        "set [serial] device = \"/dev/ttyS5\" in " + patient.board_path + " and move the HC-06 to P8.37/38");
+        "set [serial] device = \"481aa000\" in " + patient.board_path + " and move the HC-06 to P8.37/38");
     return;
   }
-  const std::string net = patient.path("/sys/class/net/" + interface);
-  const std::string up = "sudo ip link set " + interface + " up type can bitrate " +
-                         std::to_string(board.can_bitrate) + " restart-ms 100";
-  if (!may(net, F_OK)) {
-    findings->fail(
-        "can", "no interface " + interface,
-        "echo 'uboot_overlay_addr5=/lib/firmware/equipoise-can.dtbo' | sudo tee -a /boot/uEnv.txt && "
-        "sudo reboot");
-  } else if (first_line(net + "/operstate") == "down") {
-    findings->warn("can", interface + " is down", up);
+  const std::string net = find(patient, "/sys/class/net", "", board.can_interface);
+  if (net.empty()) {
+    findings->fail("can", "no CAN interface " + board.can_interface,
+                   blue ? overlay_fix(patient)
+                        : "echo 'uboot_overlay_addr5=/lib/firmware/equipoise-can.dtbo' | sudo tee -a "
+                          "/boot/uEnv.txt && sudo reboot");
+    return;
+  }
+  const std::string interface = net.substr(net.rfind('/') + 1);
+  if (first_line(net + "/operstate") == "down") {
+    findings->warn("can", interface + " is down",
+                   "sudo ip link set " + interface + " up type can bitrate " +
+                       std::to_string(board.can_bitrate) + " restart-ms 100");
   } else {
     findings->ok("can", interface + " is up");
   }

@@ -10,15 +10,11 @@
 namespace equipoise::app {
 namespace {
 
-constexpr std::array<const char*, 4> kVerdictNames{"ok", "warn", "fail", "skipped"};
-
-// cppcheck-suppress CastIntegerToAddressAtReturn  ; an array of names
-const char* name_of(doctor::Verdict verdict) { return kVerdictNames[static_cast<std::size_t>(verdict)]; }
-
 nlohmann::json to_json(const doctor::Patient& patient, const doctor::Findings& findings) {
   nlohmann::json checks = nlohmann::json::array();
   for (const doctor::Finding& f : findings.all()) {
-    checks.push_back({{"name", f.name}, {"verdict", name_of(f.verdict)}, {"what", f.what}, {"fix", f.fix}});
+    checks.push_back(
+        {{"name", f.name}, {"verdict", doctor::name_of(f.verdict)}, {"what", f.what}, {"fix", f.fix}});
   }
   return {{"ok", findings.healthy()},
           {"board", patient.board == nullptr ? nlohmann::json(nullptr) : nlohmann::json(patient.board_path)},
@@ -27,10 +23,10 @@ nlohmann::json to_json(const doctor::Patient& patient, const doctor::Findings& f
 }
 
 void print(const doctor::Findings& findings, std::FILE* out) {
-  std::array<int, kVerdictNames.size()> count{};
+  std::array<int, 4> count{};
   for (const doctor::Finding& f : findings.all()) {
     ++count[static_cast<std::size_t>(f.verdict)];
-    std::fprintf(out, "%-8s %-20s %s\n", name_of(f.verdict), f.name.c_str(), f.what.c_str());
+    std::fprintf(out, "%-8s %-20s %s\n", doctor::name_of(f.verdict), f.name.c_str(), f.what.c_str());
     if (!f.fix.empty()) std::fprintf(out, "%-8s %-20s   -> %s\n", "", "", f.fix.c_str());
   }
   std::fprintf(out, "%d ok, %d warnings, %d failures, %d skipped\n", count[0], count[1], count[2], count[3]);
@@ -40,6 +36,7 @@ struct Arguments {
   std::string board;
   std::string key;
   std::string json;
+  std::string report;
   std::string root;
 };
 
@@ -59,6 +56,10 @@ int run_doctor(const Arguments& a) {
   const doctor::Findings findings = doctor::examine(patient);
   print(findings, a.json == "-" ? stderr : stdout);
   if (!a.json.empty()) write_json(to_json(patient, findings), a.json);
+  if (!a.report.empty()) {
+    doctor::write_report(patient, findings, a.report);
+    std::fprintf(stderr, "written to %s: send this with your question\n", a.report.c_str());
+  }
   return findings.healthy() ? 0 : 1;
 }
 
@@ -71,6 +72,7 @@ void add_doctor(Subcommand app) {
   command.option("--board", a->board, "wiring, TOML: also look at everything it names");
   command.option("--command-key", a->key, "also look at this key file of run and send");
   command.option("--json", a->json, "findings as JSON, - for stdout");
+  command.option("--report", a->report, "everything a helper needs, as text, into this file");
   command.option("--root", a->root, "look at /sys, /proc and /dev below this directory, e.g. of a test");
   command.action([=] { return run_doctor(*a); });
 }

@@ -1,13 +1,29 @@
 #include "app/doctor/doctor.hpp"
 
+#include <array>
+#include <filesystem>
 #include <fstream>
 
 namespace equipoise::app::doctor {
 
-const char* const kOverlayFix =
-    "echo 'uboot_overlay_addr4=/lib/firmware/equipoise-cape.dtbo' | sudo tee -a /boot/uEnv.txt && sudo "
-    "reboot";
 const char* const kGroupFix = "sudo adduser \"$USER\" equipoise  # then log in again";
+
+std::string overlay_fix(const Patient& patient) {
+  std::error_code error;
+  if (std::filesystem::exists(patient.path("/boot/extlinux/extlinux.conf"), error))
+    return "sudo sed -i 's/^default .*/default equipoise/' /boot/extlinux/extlinux.conf && sudo reboot";
+  const std::string overlay = patient.board == nullptr ? "cape" : patient.board->overlay;
+  if (overlay == "none")
+    return "none of ours is for this board: switch the pin in the board's own device tree";
+  return "echo 'uboot_overlay_addr4=/lib/firmware/equipoise-" + overlay +
+         ".dtbo' | sudo tee -a /boot/uEnv.txt && sudo reboot";
+}
+
+const char* name_of(Verdict verdict) {
+  constexpr std::array<const char*, 4> kNames{"ok", "warn", "fail", "skipped"};
+  // cppcheck-suppress CastIntegerToAddressAtReturn  ; an array of names
+  return kNames[static_cast<std::size_t>(verdict)];
+}
 
 bool Findings::healthy() const {
   for (const Finding& finding : all_) {
@@ -23,21 +39,26 @@ std::string first_line(const std::string& path) {
   return line.substr(0, line.find('\0'));
 }
 
-Findings examine(const Patient& patient) {
+Findings examine(const Patient& asked) {
   Findings findings;
+  Patient patient = asked;
+  const bool robot = !first_line(asked.path("/proc/device-tree/model")).empty();
+  if (!robot) patient.board = nullptr;  // whoever asks from a laptop learns about the laptop
   examine_kernel(patient, &findings);
+  examine_overlay(patient, &findings);
+  examine_schedule(patient, &findings);
   examine_process(patient, &findings);
-  if (patient.board == nullptr) {
+  if (patient.board != nullptr) {
+    examine_buses(patient, &findings);
+    examine_pins(patient, &findings);
+  } else if (asked.board != nullptr) {
+    findings.skip("board",
+                  asked.board_path + " is a board file without an error; what it names is on a robot",
+                  "on the robot: equipoise doctor --board " + asked.board_path);
+  } else {
     findings.skip("board", "no board file given: nothing of a robot was looked at",
                   "equipoise doctor --board config/boards/robotics_cape_mbbr.toml");
-    return findings;
   }
-  if (first_line(patient.path("/proc/device-tree/model")).empty()) {
-    findings.skip("board", "nothing that the board file names was looked for on a machine of another kind");
-    return findings;
-  }
-  examine_buses(patient, &findings);
-  examine_pins(patient, &findings);
   return findings;
 }
 

@@ -11,6 +11,7 @@
 namespace equipoise::app::doctor {
 
 enum class Verdict { kOk, kWarn, kFail, kSkipped };
+const char* name_of(Verdict verdict);
 
 struct Finding {
   std::string name;  // what was looked at: "imu.chip"
@@ -49,19 +50,25 @@ struct Patient {
   std::string path(const std::string& absolute) const { return root + absolute; }
 };
 
-/// Loads our overlay, which sets every pin and enables every device that a board file names.
-extern const char* const kOverlayFix;
+/// Loads the overlay that sets every pin and enables every device that a board file names.
+std::string overlay_fix(const Patient& patient);
 /// Lets the user who asks at the devices; takes effect at the next login.
 extern const char* const kGroupFix;
 
-void examine_kernel(const Patient& patient, Findings* findings);   // kernel, device tree, clock
-void examine_process(const Patient& patient, Findings* findings);  // limits, LCM route, key
-void examine_buses(const Patient& patient, Findings* findings);    // I2C, counters, PWM, ADC, serial, CAN
-void examine_pins(const Patient& patient, Findings* findings);     // pinmux, GPIO chips and lines
+void examine_kernel(const Patient& patient, Findings* findings);    // kernel, device tree, clock
+void examine_process(const Patient& patient, Findings* findings);   // limits, LCM route, key
+void examine_buses(const Patient& patient, Findings* findings);     // I2C, counters, PWM, ADC, serial, CAN
+void examine_pins(const Patient& patient, Findings* findings);      // pinmux, GPIO chips and lines
+void examine_overlay(const Patient& patient, Findings* findings);   // device tree, boot loader's files
+void examine_schedule(const Patient& patient, Findings* findings);  // interrupts, CPU frequency, watchdog
 
 Findings examine(const Patient& patient);
 
 /// First line of a file, or of a device tree string; empty where there is none.
 std::string first_line(const std::string& path);
+
+/// What a maintainer needs to help from afar: the findings and what they were drawn from. No keys, no names
+/// of people or networks. InputError when the file cannot be written.
+void write_report(const Patient& patient, const Findings& findings, const std::string& path);
 
 }  // namespace equipoise::app::doctor

@@ -2,7 +2,6 @@
 #include <sys/timex.h>
 
 #include <ctime>
-#include <filesystem>
 
 #include "app/doctor/doctor.hpp"
 
@@ -30,48 +29,15 @@ void examine_preemption(const Patient& patient, Findings* findings) {
 
 void examine_model(const Patient& patient, Findings* findings) {
   const std::string model = first_line(patient.path("/proc/device-tree/model"));
-  if (model.find("BeagleBone") != std::string::npos) {
+  if (model.find("Beagle") != std::string::npos) {
     findings->ok("device_tree.model", model);
   } else if (patient.board == nullptr) {
     findings->skip("device_tree.model", model.empty()
                                             ? "no device tree: a machine for simulation, not a robot"
                                             : "\"" + model + "\": not a BeagleBone, nothing known about it");
   } else {
-    findings->fail(
-        "device_tree.model",
-        model.empty() ? "no device tree: this is not a BeagleBone" : "\"" + model + "\" is not a BeagleBone",
-        "run this on the robot: ssh debian@beaglebone.local equipoise doctor --board FILE");
-  }
-}
-
-/// The kernel accepts an overlay as a whole: its label shows that ours was.
-void examine_overlay(const Patient& patient, Findings* findings) {
-  if (patient.board == nullptr) return;
-  const std::string chosen = patient.path("/proc/device-tree/chosen/overlays");
-  std::error_code error;
-  if (!std::filesystem::is_directory(chosen, error)) {
-    findings->skip("device_tree.overlay", "this boot loader does not say which overlays it loaded");
-    return;
-  }
-  for (const auto& entry : std::filesystem::directory_iterator(chosen, error)) {
-    if (entry.path().filename().string().rfind("equipoise", 0) == 0) {
-      findings->ok("device_tree.overlay", entry.path().filename().string() + " is loaded");
-      return;
-    }
-  }
-  findings->warn("device_tree.overlay", "the overlay equipoise-cape is not loaded", kOverlayFix);
-}
-
-void examine_governor(const Patient& patient, Findings* findings) {
-  if (patient.board == nullptr) return;
-  const std::string governor =
-      first_line(patient.path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"));
-  if (governor.empty() || governor == "performance") {
-    findings->ok("kernel.cpu_frequency", governor.empty() ? "fixed" : governor);
-  } else {
-    findings->warn("kernel.cpu_frequency",
-                   "governor " + governor + ": the first ticks after a pause run slow",
-                   "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor");
+    findings->fail("device_tree.model", "\"" + model + "\" is not a BeagleBone",
+                   "run this on the robot: ssh debian@beaglebone.local equipoise doctor --board FILE");
   }
 }
 
@@ -103,9 +69,7 @@ void examine_clock(const Patient& patient, Findings* findings) {
 
 void examine_kernel(const Patient& patient, Findings* findings) {
   examine_preemption(patient, findings);
-  examine_governor(patient, findings);
   examine_model(patient, findings);
-  examine_overlay(patient, findings);
   examine_clock(patient, findings);
 }
 

@@ -82,7 +82,7 @@ void examine_line(const Patient& patient, Findings* findings, const Line& line) 
   if (holder == kOurs) {
     findings->warn(name, line.use + ": held by a running equipoise", "sudo systemctl stop equipoise");
   } else if (!holder.empty()) {
-    findings->fail(name, line.use + ": held by \"" + holder + "\"", kOverlayFix);
+    findings->fail(name, line.use + ": held by \"" + holder + "\"", overlay_fix(patient));
   } else {
     findings->ok(name, line.use + ": free");
   }
@@ -113,25 +113,29 @@ std::map<std::uint32_t, std::uint32_t> read_pads(const std::string& path) {
 struct Use {
   std::string use;
   std::vector<Pad> pads;
+  std::string owner;  // in the kernel's list of pads; empty: whoever
 };
 
 std::vector<Use> uses_of(const Board& board) {
   std::vector<Use> uses;
-  uses.push_back({"[imu] bus", pads_of_port(board.wiring.imu.bus)});
+  constexpr const char* kPinController = "44e10800";  // our lines are its own
+  uses.push_back({"[imu] bus", pads_of_port(board.wiring.imu.bus), ""});
   for (std::uint32_t i = 0; i < board.wiring.motors; ++i) {
     const bbb_motor_t& motor = board.wiring.motor[i];
     const std::string name = "motor " + std::to_string(i + 1) + " ";
-    uses.push_back({name + "pwm", pads_of_pwm(motor.pwm, motor.pwm_channel)});
-    uses.push_back({name + "encoder", pads_of_encoder(motor.encoder)});
+    uses.push_back({name + "pwm", pads_of_pwm(motor.pwm, motor.pwm_channel), motor.pwm});
+    uses.push_back({name + "encoder", pads_of_encoder(motor.encoder), motor.encoder});
   }
   for (const Line& line : lines_of(board))
-    uses.push_back({line.use, pads_of_gpio(line.chip, line.line, line.input)});
-  uses.push_back({"[serial] device", pads_of_port(board.serial_device)});
-  uses.push_back({"[can] interface", pads_of_port(board.can_interface)});
+    uses.push_back({line.use, pads_of_gpio(line.chip, line.line, line.input),
+                    line.use.rfind("[leds]", 0) == 0 ? "" : kPinController});  // the Blue's own tree has LEDs
+  const bool blue = board.overlay == "blue";
+  uses.push_back({"[serial] device", pads_of_port(board.serial_device), board.serial_device});
+  uses.push_back({"[can] interface", pads_of_port(board.can_interface, blue), board.can_interface});
   return uses;
 }
 
-void examine_pad(Findings* findings, const std::string& use, const Pad& pad,
+void examine_pad(const Patient& patient, Findings* findings, const std::string& use, const Pad& pad,
                  const std::map<std::uint32_t, std::uint32_t>& pads) {
   const std::string name = "pinmux." + pad.pin;
   const auto found = pads.find(pad.offset);
@@ -144,24 +148,57 @@ void examine_pad(Findings* findings, const std::string& use, const Pad& pad,
   if (mode != pad.mode) {
     findings->fail(
         name, use + ": pad is in mode " + std::to_string(mode) + ", needs mode " + std::to_string(pad.mode),
-        kOverlayFix);
+        overlay_fix(patient));
   } else if (deaf) {
-    findings->fail(name, use + ": the pad's receiver is off, it reads nothing", kOverlayFix);
+    findings->fail(name, use + ": the pad's receiver is off, it reads nothing", overlay_fix(patient));
   } else {
     findings->ok(name, use + ": mode " + std::to_string(mode));
   }
 }
 
+/// Who has claimed each pad: "pin 18 (PIN18): 48302200.pwm (GPIO UNCLAIMED) function ..." or "(MUX
+/// UNCLAIMED)".
+std::map<std::uint32_t, std::string> read_owners(const std::string& path) {
+  constexpr std::uint32_t kFirstPad = 0x800;
+  std::map<std::uint32_t, std::string> owners;
+  std::ifstream file(path);
+  std::string line;
+  while (std::getline(file, line)) {
+    unsigned pin = 0;
+    const std::size_t colon = line.find("): ");
+    if (colon == std::string::npos || std::sscanf(line.c_str(), "pin %u", &pin) != 1) continue;
+    const std::string rest = line.substr(colon + 3);
+    if (rest.front() != '(') owners[kFirstPad + 4 * pin] = rest.substr(0, rest.find(' '));
+  }
+  return owners;
+}
+
+void examine_owner(const Patient& patient, Findings* findings, const Use& use, const Pad& pad,
+                   const std::map<std::uint32_t, std::string>& owners) {
+  const auto found = owners.find(pad.offset);
+  if (use.owner.empty() || use.owner.front() == '/') return;
+  const std::string name = "owner." + pad.pin;
+  if (found == owners.end()) {
+    findings->warn(name, use.use + ": nobody has claimed its pad", overlay_fix(patient));
+  } else if (found->second.find(use.owner) == std::string::npos) {
+    findings->fail(name, use.use + ": its pad belongs to " + found->second, overlay_fix(patient));
+  }
+}
+
 void examine_pinmux(const Patient& patient, Findings* findings) {
-  const std::string pins = patient.path("/sys/kernel/debug/pinctrl/44e10800.pinmux-pinctrl-single/pins");
-  const auto pads = read_pads(pins);
+  const std::string controller = patient.path("/sys/kernel/debug/pinctrl/44e10800.pinmux-pinctrl-single/");
+  const auto pads = read_pads(controller + "pins");
   if (pads.empty()) {
     findings->skip("pinmux", "only root may read what the pins are switched to",
                    "sudo equipoise doctor --board " + patient.board_path);
     return;
   }
+  const auto owners = read_owners(controller + "pinmux-pins");
   for (const Use& use : uses_of(*patient.board)) {
-    for (const Pad& pad : use.pads) examine_pad(findings, use.use, pad, pads);
+    for (const Pad& pad : use.pads) {
+      examine_pad(patient, findings, use.use, pad, pads);
+      if (!owners.empty()) examine_owner(patient, findings, use, pad, owners);
+    }
   }
 }
 

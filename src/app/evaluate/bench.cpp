@@ -103,7 +103,7 @@ nlohmann::json quantiles(std::vector<std::int64_t> late_ns) {
 /// Ours and a bare loop take turns, so that both meet the same neighbours.
 nlohmann::json bench_wake(const Arguments& a) {
   constexpr std::int64_t kPeriod_ns = 5'000'000;
-  constexpr int kTurn = 40;
+  const int turn = std::min(a.wakes, 40);
   runtime::HeartbeatPage page{};
   runtime::Supervisor supervisor({}, &page, 0);
   std::vector<std::int64_t> ours;
@@ -111,7 +111,7 @@ nlohmann::json bench_wake(const Arguments& a) {
   for (auto* late : {&ours, &bare}) late->reserve(2 * static_cast<std::size_t>(a.wakes));
   std::int64_t due_ns = runtime::monotonic_now_ns() + kPeriod_ns;
   for (int i = 0; i < 2 * a.wakes; ++i) {
-    const bool is_ours = i / kTurn % 2 == 0;
+    const bool is_ours = i / turn % 2 == 0;
     runtime::sleep_until(due_ns);
     const std::int64_t now_ns = runtime::monotonic_now_ns();
     (is_ours ? ours : bare).push_back(now_ns - due_ns);
