@@ -17,6 +17,14 @@ const std::vector<std::string> kBridgeNames{"drive_brake", "drive_coast"};
 
 }  // namespace
 
+double number_or(Section& s, const char* key, double otherwise, double min, double max) {
+  return s.has(key) ? s.number(key, min, max) : otherwise;
+}
+
+std::string world_key(const Section& worlds, const std::string& fidelity) {
+  return fidelity == "nominal" && !worlds.has(fidelity) ? "full" : fidelity;
+}
+
 void expect_robot(Section& robot, const std::string& type) {
   const std::string found = robot.text("type");
   if (found != type) robot.fail("type", "\"" + found + "\" is not this robot; expected " + type);
@@ -99,20 +107,43 @@ AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m) {
 
 namespace {
 
+ActualScales read_actual(Section s, bool has_ball) {
+  ActualScales a;
+  const auto scale = [&s](const char* key, double* value) {
+    if (s.has(key)) *value = s.number(key, 0.1, 10.0);
+  };
+  scale("body_mass_scale", &a.body_mass);
+  scale("com_height_scale", &a.com_height);
+  scale("body_inertia_scale", &a.body_inertia);
+  if (has_ball) scale("ball_mass_scale", &a.ball_mass);
+  if (has_ball) scale("ball_radius_scale", &a.ball_radius);
+  scale("wheel_radius_scale", &a.wheel_radius);
+  scale("torque_scale", &a.torque);
+  scale("back_emf_scale", &a.back_emf);
+  s.finish();
+  return a;
+}
+
 void read_disturbance(Section& s, WorldParams* w) {
   w->stiction.static_ratio = s.number("static_ratio", 1.0, 5.0);
   w->stiction.rate_rad_s = s.number("stribeck_rate_rad_s", 1e-3, 100.0);
   w->diode_drop_V = s.number("diode_drop_V", 0.0, 3.0);
   const int steps = static_cast<int>(std::lround(kTickS / w->step_s));
   w->actuation_latency_steps = s.integer("actuation_latency_steps", 0, std::max(0, steps - 1));
+  w->actuation_delay_ticks = number_or(s, "actuation_delay_ticks", 0.0, 0.0, 0.999);
+  if (w->actuation_steps() >= steps) s.fail("actuation_delay_ticks", "with the latency more than a tick");
   w->sensor_latency_ticks = s.integer("sensor_latency_ticks", 0, 3);
+  if (s.has("imu_low_pass")) w->imu_low_pass = s.integer("imu_low_pass", 0, IMU_LOW_PASS_MAX);
+  w->imu_delay_scale = number_or(s, "imu_delay_scale", 1.0, 0.0, 2.0);
+  w->imu_sample_age_s = number_or(s, "imu_sample_age_s", 0.0, 0.0, 0.01);
+  w->encoder_sample_age_s = number_or(s, "encoder_sample_age_s", 0.0, 0.0, 0.01);
   w->imu_misalignment_rad = s.vector<3>("imu_misalignment_rad", -0.5, 0.5);
   w->floor_slope_rad = s.vector<2>("floor_slope_rad", -0.3, 0.3);
 }
 
 }  // namespace
 
-WorldParams read_world(Section s, BridgeType* bridge, const std::function<void(Section&)>& rest) {
+WorldParams read_world(Section s, BridgeType* bridge, const RobotsOwn& own) {
   WorldParams w;
   *bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
   w.step_s = s.number("step_s", 1e-5, kTickS);
@@ -140,10 +171,11 @@ WorldParams read_world(Section s, BridgeType* bridge, const std::function<void(S
     row.finish();
     w.pushes.push_back(push);
   }
+  if (s.has("actual")) w.actual = read_actual(s.table("actual"), own.has_ball);
   if (s.has("disturbance")) {
     Section disturbance = s.table("disturbance");
     read_disturbance(disturbance, &w);
-    rest(disturbance);
+    own.disturbance(disturbance);
     disturbance.finish();
   }
   s.finish();

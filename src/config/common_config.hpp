@@ -17,15 +17,24 @@ namespace equipoise::config {
 /// ConfigError unless the file is for this robot.
 void expect_robot(Section& robot, const std::string& type);
 
+/// For keys that logs of earlier builds lack.
+double number_or(Section& s, const char* key, double otherwise, double min, double max);
+
+/// The name under which a file has this world; logs of earlier builds call the nominal one full.
+std::string world_key(const Section& worlds, const std::string& fidelity);
+
 MotorParameters read_motor(Section s);
 Calibration read_calibration(Section s, int wheels);
 SafetyParams read_safety(Section s);
 /// Of our own filter; `imu_position_m`: lever arm.
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m);
-/// All of a world but its process noise; `bridge`: what the simulated robot is built with. Its table
-/// `disturbance`, when there is one, is read by `rest` as well: what only this robot has.
-WorldParams read_world(
-    Section s, BridgeType* bridge, const std::function<void(Section&)>& rest = [](Section&) {});
+/// What of a world only one robot has.
+struct RobotsOwn {
+  bool has_ball = false;
+  std::function<void(Section&)> disturbance = [](Section&) {};  // its keys of the table `disturbance`
+};
+/// All of a world but its process noise; `bridge`: what the simulated robot is built with.
+WorldParams read_world(Section s, BridgeType* bridge, const RobotsOwn& own = {});
 
 template <class Filter>
 void read_filter(Section s, typename Filter::Params& params) {

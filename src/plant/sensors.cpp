@@ -29,6 +29,7 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
       accel_noise_(world.seed, kAccelNoise),
       encoder_noise_(world.seed, kEncoderNoise),
       attitude_noise_(world.seed, kAttitudeNoise) {
+  aged_ = world.gyro_age_s() > 0.0 || world.accel_age_s() > 0.0 || world.encoder_sample_age_s > 0.0;
   misaligned_ = !world.imu_misalignment_rad.isZero(0.0);
   const double turn = world.imu_misalignment_rad.norm();
   R_misaligned_ = misaligned_ ? Eigen::AngleAxisd(turn, world.imu_misalignment_rad / turn).toRotationMatrix()
@@ -51,12 +52,25 @@ void SimulatedSensors::attitude_packet(const Vec3& theta_rad) {
 
 RawSample SimulatedSensors::sense(const TrueMotion& m) {
   const auto late = std::min(static_cast<std::size_t>(world_.sensor_latency_ticks), samples_);
-  const RawSample now = sense_now(m);
+  const RawSample now = sense_now(aged_ ? as_felt(m) : m);
   sampled_[samples_ % kSampleDelay] = now;
   RawSample raw = sampled_[(samples_ - late) % kSampleDelay];
   ++samples_;
   raw.t_ns = now.t_ns;
   return raw;
+}
+
+/// The motion with each sensor's own age.
+TrueMotion SimulatedSensors::as_felt(const TrueMotion& m) noexcept {
+  Felt now{m.time_s, m.omega_B_rad_s, m.specific_force_B_m_s2,
+           Eigen::Map<const Vec<kMaxMotors>>(m.wheel_angle_rad.data())};
+  past_.add(now);
+  TrueMotion felt = m;
+  felt.omega_B_rad_s = past_.value(m.time_s - world_.gyro_age_s(), &Felt::omega_B_rad_s);
+  felt.specific_force_B_m_s2 = past_.value(m.time_s - world_.accel_age_s(), &Felt::specific_force_B_m_s2);
+  const Vec<kMaxMotors> wheels = past_.value(m.time_s - world_.encoder_sample_age_s, &Felt::wheel_angle_rad);
+  std::copy(wheels.begin(), wheels.end(), felt.wheel_angle_rad.begin());
+  return felt;
 }
 
 RawSample SimulatedSensors::sense_now(const TrueMotion& m) {

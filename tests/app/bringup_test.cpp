@@ -25,13 +25,13 @@ const std::string kMbbrBoard = kSource + "/config/boards/robotics_cape_mbbr.toml
 PracticeSetup mbbr_setup() {
   const MbbrConfig config = load_mbbr(kSource + "/config/mbbr.toml", {}).config;
   return {layout_of(config.robot, config.motor, config.calibration), Vec3::UnitY(), config.motor,
-          config.calibration, config.world[static_cast<std::size_t>(Fidelity::kFull)].common};
+          config.calibration, config.world[static_cast<std::size_t>(Fidelity::kNominal)].common};
 }
 
 PracticeSetup mip_setup() {
   const MipConfig config = load_mip(kSource + "/config/edumip.toml", {}).config;
   return {layout_of(config.robot, config.motor, config.calibration), Vec3::UnitX(), config.motor,
-          config.calibration, config.world[static_cast<std::size_t>(Fidelity::kFull)].common};
+          config.calibration, config.world[static_cast<std::size_t>(Fidelity::kNominal)].common};
 }
 
 std::vector<WheelFinding> pulses(const PracticeSetup& setup, PracticeRobot& robot) {

@@ -35,7 +35,7 @@ def _state(tick: int, theta_x: float, theta_y: float, rate_error: float = 0.0, s
 def _run(robot: str):
     run = equipoise.run_t()
     run.robot = robot
-    run.estimator, run.controller, run.fidelity = "ekf", "scheduled", "full"
+    run.estimator, run.controller, run.fidelity = "ekf", "scheduled", "nominal"
     run.seed, run.rolling_radius_m = 7, RADIUS_M
     run.version, run.config_sha256 = "0.0.0", "ab" * 32
     return run

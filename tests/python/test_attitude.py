@@ -58,7 +58,7 @@ def theirs(gyro, accel) -> np.ndarray:
 
 
 def flight(root, binary, folder, robot, yaw, seed):
-    """Gyro and specific force in body axes, and the true vertical, of 40 s in the full world."""
+    """Gyro and specific force in body axes, and the true vertical, of 40 s in the nominal world."""
     config, R_BS, _ = ROBOTS[robot]
     log_path = folder / "run.lcm"
     command = [binary, "sim", "--config", config, "--yaw-rad-s", str(yaw), "--duration-s", "40"]

@@ -20,7 +20,7 @@ from equipoise_tools.log import read_log
 SCENARIOS = [
     (estimator, controller, fidelity)
     for estimator in ("ekf", "ekf13", "ekf13_published", "kf_attitude", "truth")
-    for controller, fidelity in (("scheduled", "full"), ("thesis", "thesis"), ("scheduled", "ideal"))
+    for controller, fidelity in (("scheduled", "nominal"), ("thesis", "thesis"), ("scheduled", "ideal"))
 ]
 
 

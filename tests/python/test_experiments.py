@@ -123,5 +123,5 @@ def test_the_strategy_of_the_calibration_finds_a_minimum():
 def test_fragment_has_every_setting_once(tmp_path):
     start = {key: begin for key, (_, _, begin) in SEARCHED.items()}
     table = tomllib.loads(fragment(start, 0.0, "test"))
-    assert table["world"]["full"]["disturbance"]["imu_misalignment_rad"][2] == 0.0
+    assert table["world"]["nominal"]["disturbance"]["imu_misalignment_rad"][2] == 0.0
     assert len(table["estimator"]["ekf13_published"]["q"]) == 13

@@ -13,7 +13,7 @@ template <class Firmware>
 class EncoderCheckOnRobot : public testing::Test {
  protected:
   static app::Choice choice(const std::string& controller) {
-    return {Firmware::kDefaultEstimator, controller, "full", false, ""};
+    return {Firmware::kDefaultEstimator, controller, "nominal", false, ""};
   }
   static constexpr std::size_t kWheels = Firmware::Robot::kWheels;
 };
@@ -59,9 +59,9 @@ TYPED_TEST(EncoderCheckOnRobot, LeavesHealthyEncodersAlone) {
 
 TEST(PickUp, TurnsTheMotorsOffWhenTheWheelsLoseTheGround) {
   for (const std::string controller : {"slc", "lqr"}) {
-    const app::Choice choice{"ekf", controller, "full", false, ""};
+    const app::Choice choice{"ekf", controller, "nominal", false, ""};
     const FlightEnd end =
-        fly_with<app::MipFirmware>(choice, 1, 8.0, [](RawSample&) {}, {"world.full.lift_at_s=3.0"});
+        fly_with<app::MipFirmware>(choice, 1, 8.0, [](RawSample&) {}, {"world.nominal.lift_at_s=3.0"});
     EXPECT_EQ(end.arm_state, ArmState::kFault) << controller;
     EXPECT_TRUE(end.reasons & (kPickedUp | kSaturated)) << controller << " reasons " << end.reasons;
   }

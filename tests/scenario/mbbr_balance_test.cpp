@@ -17,7 +17,7 @@ struct Flight {
   double drive_mps = 0.0;
   double duration_s = 30.0;
   std::uint64_t seed = 1;
-  Fidelity fidelity = Fidelity::kFull;
+  Fidelity fidelity = Fidelity::kNominal;
   bool compare = false;
 };
 
@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(DriveRates, KfAttitude, testing::Values(Drive{0.0, 0.20
 class Comparison : public testing::TestWithParam<Drive> {};
 
 TEST_P(Comparison, CorrectedFiltersBeatThePrintedOneOnTheSameSamples) {
-  for (const Fidelity fidelity : {Fidelity::kThesis, Fidelity::kFull}) {
+  for (const Fidelity fidelity : {Fidelity::kThesis, Fidelity::kNominal}) {
     for (int seed = 1; seed <= 3; ++seed) {
       Flight o;
       o.yaw_hz = GetParam().yaw_hz;
@@ -164,7 +164,8 @@ TEST(Simulation, NoiseThroughTheTorquesBeatsADiagonalUnderFriction) {
 TEST(Simulation, RecoversFromAPush) {
   Flight o;
   o.duration_s = 10.0;
-  const std::vector<std::string> push{"world.full.pushes=[{at_s=5.0, duration_s=0.05, force_N=[4.0, 0.0]}]"};
+  const std::vector<std::string> push{
+      "world.nominal.pushes=[{at_s=5.0, duration_s=0.05, force_N=[4.0, 0.0]}]"};
   const SimSummary s = run(o, MbbrEstimatorId::kEkf, push);
   EXPECT_FALSE(s.fell);
   EXPECT_GT(s.duty_max, run(o, MbbrEstimatorId::kEkf).duty_max) << "the push was felt";

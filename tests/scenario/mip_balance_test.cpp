@@ -12,7 +12,7 @@ const std::string kMip = std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.tom
 app::SimSummary run(const std::string& controller, double yaw_rate_rad_s, std::uint64_t seed,
                     double duration_s, const std::vector<std::string>& set = {}, bool compare = false) {
   static const std::atomic<bool> never{false};
-  const app::Choice choice{"ekf", controller, "full", compare, "dmp"};
+  const app::Choice choice{"ekf", controller, "nominal", compare, "dmp"};
   const app::SimOptions options{yaw_rate_rad_s, 0.0, duration_s, seed};
   return app::simulate<app::MipFirmware>(load_mip(kMip, set).config, choice, options, nullptr, never);
 }
@@ -24,7 +24,7 @@ TEST_P(MipBalance, HoldsAMinuteForEverySeed) {
   const auto& [controller, bridge, yaw_rate] = GetParam();
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const app::SimSummary s =
-        run(controller, yaw_rate, seed, 60.0, {"world.full.bridge=" + std::string(bridge)});
+        run(controller, yaw_rate, seed, 60.0, {"world.nominal.bridge=" + std::string(bridge)});
     EXPECT_FALSE(s.fell) << "seed " << seed << " at " << s.fell_at_s << " s, reasons " << s.reasons;
     EXPECT_NEAR(2.0 * kPi * s.yaw_rate_mean_hz, yaw_rate, 0.05) << "seed " << seed;
     EXPECT_LE(s.controlling.attitude_rmse_rad, 0.010) << "seed " << seed;
@@ -47,13 +47,13 @@ TEST(Mip, FiltersWithoutTheLeverArmFailAtTenRadiansPerSecond) {
 
 TEST(Mip, ThePublishedControllerBalancesToo) {
   EXPECT_FALSE(
-      run("slc", 0.0, 1, 30.0, {"controller.slc.published=true", "world.full.backlash_rad=0.0"}).fell);
+      run("slc", 0.0, 1, 30.0, {"controller.slc.published=true", "world.nominal.backlash_rad=0.0"}).fell);
 }
 
 TEST(Mip, RecoversFromAPush) {
   const std::vector<std::string> quiet{"safety.encoder_check_drive=0.0"};  // which moves the wheels, too
-  const std::vector<std::string> push{quiet[0],
-                                      "world.full.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, 1.0]}]"};
+  const std::vector<std::string> push{
+      quiet[0], "world.nominal.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, 1.0]}]"};
   for (const char* controller : {"slc", "lqr"}) {
     const app::SimSummary s = run(controller, 0.0, 1, 10.0, push);
     EXPECT_FALSE(s.fell) << controller;

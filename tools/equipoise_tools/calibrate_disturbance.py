@@ -36,7 +36,7 @@ TABLE_6_1 = (
 WITHIN = 1.20
 DURATION_S = 15.0
 FALLEN = 10.0
-D = "world.full.disturbance."
+D = "world.nominal.disturbance."
 # Key -> (low, high, start); [T] knows of each effect and gives a magnitude for the torque imbalance only.
 SEARCHED = {
     D + "coulomb_scale": (0.7, 1.6, 0.94),
@@ -51,7 +51,7 @@ SEARCHED = {
     "misalignment_y": (-0.06, 0.06, 0.012),
     "imu_x": (-0.03, 0.03, 0.0),
     "imu_y": (-0.03, 0.03, 0.0),
-    "world.full.accel_sigma_m_s2": (0.1, 3.0, 1.2),
+    "world.nominal.accel_sigma_m_s2": (0.1, 3.0, 1.2),
     "friction.compensation": (0.5, 1.2, 1.16),
 }
 WHOLE = D + "actuation_latency_steps"

@@ -18,6 +18,8 @@ class SimulatedMotors {
   SimulatedMotors(const MotorParameters& motor, const Calibration& calibration, const WorldParams& world)
       : motor_(motor),
         calibration_(calibration),
+        torque_scale_(world.actual.torque),
+        back_emf_scale_(world.actual.back_emf),
         open_V_(world.battery_V),
         resistance_ohm_(world.battery_resistance_ohm),
         diode_drop_V_(world.diode_drop_V),
@@ -34,8 +36,9 @@ class SimulatedMotors {
   Vec<N> torque(const Vec<N>& wheel_rate_rad_s) const noexcept {
     Vec<N> torque = Vec<N>::Zero();
     if (!command_.enable) return torque;  // all switches open: the current decays at once
-    const double stall_torque = motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
-    const double no_load = motor_.no_load_rad_s(battery_V_);
+    const double stall_torque =
+        torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
+    const double no_load = no_load_rad_s();
     for (int i = 0; i < N; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const double omega_r = wheel_rate_rad_s(i) / no_load;
@@ -51,13 +54,17 @@ class SimulatedMotors {
     double supply_A = 0.0;
     for (int i = 0; i < N && command_.enable; ++i) {
       const double duty = command_.duty[static_cast<std::size_t>(i)];
-      const double omega_r = wheel_rate_rad_s(i) / motor_.no_load_rad_s(battery_V_);
+      const double omega_r = wheel_rate_rad_s(i) / no_load_rad_s();
       supply_A += std::abs(duty * motor_.stall_current_A(battery_V_) * (duty - omega_r));
     }
     battery_V_ = open_V_ - resistance_ohm_ * supply_A;
   }
 
+  /// Torque lost per rad/s of a wheel while its bridge drives. (5.12)
+  double damping_N_m_s() const noexcept { return torque_scale_ * back_emf_scale_ * motor_.k2(); }
+
  private:
+  double no_load_rad_s() const noexcept { return motor_.no_load_rad_s(battery_V_) / back_emf_scale_; }
   double current_over_stall(std::size_t k, double omega_r) const noexcept {
     const double duty = calibration_.motor_sign[k] * command_.duty[k];
     if (motor_.bridge == BridgeType::kDriveBrake) return duty - omega_r;
@@ -68,6 +75,8 @@ class SimulatedMotors {
 
   MotorParameters motor_;
   Calibration calibration_;
+  double torque_scale_;
+  double back_emf_scale_;
   double open_V_;
   double resistance_ohm_;
   double diode_drop_V_;

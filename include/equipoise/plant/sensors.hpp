@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "equipoise/plant/delay_line.hpp"
 #include "equipoise/plant/noise.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/samples.hpp"
@@ -39,10 +40,15 @@ class SimulatedSensors {
   SimulatedSensors(const Calibration& calibration, const WorldParams& world, int wheels, NoiseStream& start,
                    const Vec3& theta_rad);
 
+  /// True when a sensor reports the past: the world then calls `feel` at every step.
+  bool aged() const noexcept { return aged_; }
+  void feel(const Felt& felt) noexcept { past_.add(felt); }
+
   /// What the devices report; late by the world's latency, stamped with the time of asking.
   RawSample sense(const TrueMotion& m);
 
  private:
+  TrueMotion as_felt(const TrueMotion& m) noexcept;
   RawSample sense_now(const TrueMotion& m);
   void attitude_packet(const Vec3& theta_rad);
 
@@ -52,6 +58,8 @@ class SimulatedSensors {
   NoiseStream gyro_noise_, accel_noise_, encoder_noise_, attitude_noise_;
   Vec3 gyro_bias_, accel_bias_;
   bool misaligned_;
+  bool aged_;
+  DelayLine past_;
   Mat3 R_misaligned_;
   Vec3 attitude_error_ = Vec3::Zero();
   static constexpr std::size_t kAttitudeDelay = 16;

@@ -1,6 +1,7 @@
 // What the simulated worlds of all robots share: parameters of sensors, battery, attitude packets and pushes.
 // Fidelity levels choose among them: `ideal` (rigid bodies, linear motors, perfect sensors), `thesis` (what
-// [T] section 6.3 simulated: friction and the filters' own noise), `full` (everything here). Simulation only.
+// [T] section 6.3 simulated: friction and the filters' own noise), `nominal` (a robot as its model says, with
+// noise and drive/coast bridges), `full` (a robot as built: docs/disturbances.md). Simulation only.
 #pragma once
 
 #include <cmath>
@@ -8,13 +9,26 @@
 #include <vector>
 
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/imu_low_pass.h"
 #include "equipoise/plant/coulomb.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise {
 
-enum class Fidelity { kIdeal, kThesis, kFull };
+enum class Fidelity { kIdeal, kThesis, kNominal, kFull };
+
+/// How the robot at hand differs from its model: factors on the plant alone; the firmware keeps its numbers.
+struct ActualScales {
+  double body_mass = 1.0;
+  double com_height = 1.0;
+  double body_inertia = 1.0;
+  double ball_mass = 1.0;  // and the ball's inertia with it; MBBR
+  double ball_radius = 1.0;
+  double wheel_radius = 1.0;
+  double torque = 1.0;    // of every motor per unit of current
+  double back_emf = 1.0;  // of every motor per rad/s
+};
 
 /// A force on the body's centre of mass, world axes.
 struct Push {
@@ -52,9 +66,28 @@ struct WorldParams {
   Stiction stiction;
   double diode_drop_V = 0.0;        // V_d of each of the two diodes that carry the current back; drive/coast
   int actuation_latency_steps = 0;  // until the bridges follow
-  int sensor_latency_ticks = 0;     // of a whole sample
+  double actuation_delay_ticks = 0.0;  // beside the latency: where in the tick the PWM takes the new duty
+  int sensor_latency_ticks = 0;        // of a whole sample
+  /// Age of each sensor within its sample: the IMU's low pass by its register (0: none), and sampling
+  /// instants.
+  int imu_low_pass = 0;
+  double imu_delay_scale = 1.0;  // of the register's delays
+  double imu_sample_age_s = 0.0;
+  double encoder_sample_age_s = 0.0;
   Vec3 imu_misalignment_rad = Vec3::Zero();  // rotation vector, body axes: mount against calibration
   Vec2 floor_slope_rad = Vec2::Zero();       // rise towards world x, y
+  ActualScales actual;
+
+  double gyro_age_s() const noexcept {
+    return imu_sample_age_s + (imu_low_pass > 0 ? imu_delay_scale * imu_gyro_delay_s(imu_low_pass) : 0.0);
+  }
+  double accel_age_s() const noexcept {
+    return imu_sample_age_s + (imu_low_pass > 0 ? imu_delay_scale * imu_accel_delay_s(imu_low_pass) : 0.0);
+  }
+  /// When in a tick the bridges take their command, in steps.
+  double actuation_steps() const noexcept {
+    return actuation_latency_steps + actuation_delay_ticks * (kTickS / step_s);
+  }
 };
 
 }  // namespace equipoise

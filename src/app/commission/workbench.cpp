@@ -71,7 +71,7 @@ Workbench::Workbench(const WorkbenchArguments& a)
     setup_.tip_axis_B = tip_axis(config.robot);
     setup_.motor = config.motor;
     setup_.calibration = config.calibration;
-    setup_.world = config.world[static_cast<std::size_t>(Fidelity::kFull)].common;
+    setup_.world = config.world[static_cast<std::size_t>(Fidelity::kNominal)].common;
     tip_words_ = words_for_tip(config.robot);
   });
   const Calibration& c = setup_.calibration;

@@ -55,7 +55,7 @@ template <class Firmware>
 nlohmann::json bench_tick(const Arguments& a) {
   Choice choice;
   complete<Firmware>(choice);
-  choice.fidelity = "full";
+  choice.fidelity = "nominal";
   const auto config = Firmware::apply(Firmware::load(a.config, {}).config, choice);
   return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
     auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);

@@ -31,7 +31,7 @@ struct Soak {
 
 template <class Firmware>
 Verdict one(const typename Firmware::Config& config, const FlightPlan& plan, std::uint64_t seed) {
-  auto world = Firmware::world(config, fidelity_level("full"), seed);
+  auto world = Firmware::world(config, fidelity_level("nominal"), seed);
   return Firmware::with_pipeline(config, Firmware::kDefaultController,
                                  [&](auto& pipeline) { return fly_with_fault(world, pipeline, plan, seed); });
 }
@@ -91,7 +91,7 @@ int campaign(const Arguments& a) {
   Choice choice;
   choice.estimator = Firmware::kDefaultEstimator;
   choice.controller = Firmware::kDefaultController;
-  choice.fidelity = "full";
+  choice.fidelity = "nominal";
   const auto config = Firmware::apply(Firmware::load(a.config, {}).config, choice);
 
   nlohmann::json cases = nlohmann::json::array();

@@ -11,7 +11,7 @@
 namespace equipoise::app {
 
 struct MbbrRigOptions {
-  Fidelity fidelity = Fidelity::kFull;
+  Fidelity fidelity = Fidelity::kNominal;
   std::uint64_t seed = 1;
   MbbrEstimatorId estimator = MbbrEstimatorId::kEkf;
   bool compare = false;

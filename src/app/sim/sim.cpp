@@ -185,8 +185,8 @@ void add_sim(Subcommand app) {
   command.option("--seed", a->options.seed, "seed of every random number").show_default();
   command.option("--estimator", a->choice.estimator, "which estimator controls: " + known_estimators());
   command.option("--controller", a->choice.controller, known_controllers());
-  a->choice.fidelity = "full";
-  command.option("--fidelity", a->choice.fidelity, "ideal, thesis, full")
+  a->choice.fidelity = "nominal";
+  command.option("--fidelity", a->choice.fidelity, "ideal, thesis, nominal, full")
       .show_default()
       .one_of(kFidelityNames);
   a->choice.attitude = "dmp";

@@ -98,7 +98,7 @@ void read_disturbance(Section& s, MbbrWorldParams* w) {
 MbbrWorldParams read_mbbr_world(Section s, BridgeType* bridge) {
   MbbrWorldParams w;
   w.process_noise_sigma = s.vector<10>("process_noise_variance", 0.0, 10.0).cwiseSqrt();
-  w.common = config::read_world(s, bridge, [&w](Section& d) { read_disturbance(d, &w); });
+  w.common = config::read_world(s, bridge, {true, [&w](Section& d) { read_disturbance(d, &w); }});
   return w;
 }
 
@@ -140,7 +140,8 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
-    c.world[i] = read_mbbr_world(world.table(kFidelityNames[i]), &c.world_bridge[i]);
+    c.world[i] =
+        read_mbbr_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
   }
   world.finish();
   root.finish();

@@ -30,8 +30,8 @@ struct MbbrConfig {
   MbbrScheduledFeedbackParams scheduled;
   SafetyParams safety;
   AttitudeFilterParams attitude;
-  std::array<MbbrWorldParams, 3> world;      // by Fidelity
-  std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
+  std::array<MbbrWorldParams, 4> world;      // by Fidelity
+  std::array<BridgeType, 4> world_bridge{};  // what the simulated robot is built with
 
   MbbrThesisPipeline::Params thesis_pipeline() const;
   MbbrScheduledPipeline::Params scheduled_pipeline() const;

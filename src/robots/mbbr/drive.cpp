@@ -32,11 +32,10 @@ Grip limit_by_grip(double torque_N_m, double limit_N_m, double motor_damping_N_m
   return {passed, (torque_N_m - passed) / motor_damping_N_m_s};
 }
 
-MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MotorParameters& motor, const MbbrDriveParams& p)
+MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p)
     : p_(p),
       kinematics_(robot),
       ratio_(robot.r / robot.r_w),
-      motor_damping_N_m_s_(motor.k2()),
       grip_N_m_(grip_limit_N_m(p.wheel_grip, robot)),
       contacts_(wheel_contacts(robot)),
       tilted_(kinematics_.T_ob()) {}
@@ -73,7 +72,7 @@ void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, co
   if (p_.wheel_grip != 0.0) {
     const Vec3 torque = wheel_torques(motors, wheel_rate);
     for (int i = 0; i < Mbbr::kWheels; ++i) {
-      slip_rad_(i) += limit_by_grip(torque(i), grip_N_m_, motor_damping_N_m_s_).slip_rad_s * step_s;
+      slip_rad_(i) += limit_by_grip(torque(i), grip_N_m_, motors.damping_N_m_s()).slip_rad_s * step_s;
     }
   }
 }

@@ -39,7 +39,7 @@ class MbbrDrive {
  public:
   using Motors = SimulatedMotors<Mbbr::kWheels>;
 
-  MbbrDrive(const MbbrParameters& robot, const MotorParameters& motor, const MbbrDriveParams& p);
+  MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p);
 
   /// Rows, gears and slip are held over a step.
   void begin_step(const Motors& motors, const Vec3& relative_rate_B, const Vec3& wheel_angle_rad,
@@ -60,7 +60,6 @@ class MbbrDrive {
   MbbrDriveParams p_;
   MbbrKinematics kinematics_;
   double ratio_;
-  double motor_damping_N_m_s_;
   double grip_N_m_;
   Mat3 contacts_;  // normals, columns
   Mat3 tilted_;    // axes of the rows that carry now, columns

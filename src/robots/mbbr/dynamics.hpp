@@ -8,24 +8,20 @@
 
 namespace equipoise {
 
-/// Tilt with its sines and cosines, which every function below needs: computed once per evaluation.
+/// Tilt with its sines, cosines and rotation, which every function below needs: computed once per evaluation.
 class MbbrMotion {
  public:
   MbbrMotion() = default;
-  MbbrMotion(const Vec2& theta_xy, const Vec3& omega, const Vec2& phi_dot) noexcept
-      : omega_B(omega),
-        phi_dot_star(phi_dot),
-        theta_xy_(theta_xy),
-        sx_(std::sin(theta_xy.x())),
-        cx_(std::cos(theta_xy.x())),
-        sy_(std::sin(theta_xy.y())),
-        cy_(std::cos(theta_xy.y())) {}
+  MbbrMotion(const Vec2& theta_xy, const Vec3& omega, const Vec2& phi_dot) noexcept;
 
   const Vec2& theta_xy() const noexcept { return theta_xy_; }
   double sx() const noexcept { return sx_; }
   double cx() const noexcept { return cx_; }
   double sy() const noexcept { return sy_; }
   double cy() const noexcept { return cy_; }
+  /// Of the tilt alone, yaw frame <- body: Ry(theta_y) Rx(theta_x). Rows: the yaw frame's axes in body
+  /// components.
+  const Mat3& R() const noexcept { return R_; }
   /// Euler angle rates, [T] (A.13) inverted.
   Vec3 theta_dot() const noexcept;
 
@@ -35,6 +31,15 @@ class MbbrMotion {
  private:
   Vec2 theta_xy_ = Vec2::Zero();
   double sx_ = 0.0, cx_ = 1.0, sy_ = 0.0, cy_ = 1.0;
+  Mat3 R_ = Mat3::Identity();
+};
+
+/// Forces beside gravity. `tau_B`: torque on the ball; `push_B`: on the body's centre of mass, N;
+/// `pull_star`: on the ball's centre, yaw frame, N.
+struct MbbrLoads {
+  Vec3 tau_B = Vec3::Zero();
+  Vec3 push_B = Vec3::Zero();
+  Vec2 pull_star = Vec2::Zero();
 };
 
 struct MbbrAccelerations {
@@ -42,14 +47,26 @@ struct MbbrAccelerations {
   Vec2 phi_ddot_inertial;  // inertial acceleration of the ball angles, resolved in the yaw frame
 };
 
+/// Kane's mass matrix at one tilt, factored.
+struct MbbrMass {
+  Mat<3, 2> C;   // body to ball
+  Mat<3, 2> DC;  // diag(body_inertia)^-1 C
+  double s11 = 0.0, s22 = 0.0, s12 = 0.0, det = 1.0;
+};
+
 class MbbrDynamics {
  public:
   explicit MbbrDynamics(const MbbrParameters& p) noexcept;
 
-  /// `tau_B`: torque on the ball; `push_B`: force on the body's centre of mass, N; `pull_star`: force on the
-  /// ball's centre, yaw frame, N.
+  MbbrAccelerations accelerations(const MbbrMotion& m, const MbbrMass& mass,
+                                  const MbbrLoads& loads) const noexcept;
   MbbrAccelerations accelerations(const MbbrMotion& m, const Vec3& tau_B, const Vec3& push_B = Vec3::Zero(),
-                                  const Vec2& pull_star = Vec2::Zero()) const noexcept;
+                                  const Vec2& pull_star = Vec2::Zero()) const noexcept {
+    return accelerations(m, mass(m), {tau_B, push_B, pull_star});
+  }
+  MbbrMass mass(const MbbrMotion& m) const noexcept;
+  /// What a further torque on the ball adds: the accelerations are linear in it.
+  MbbrAccelerations response(const MbbrMotion& m, const MbbrMass& mass, const Vec3& tau_B) const noexcept;
 
   /// Ball rate relative to the body, body axes: what the encoders see. [T] (5.10)
   static Vec3 encoder_rate_B(const MbbrMotion& m) noexcept;
@@ -67,8 +84,10 @@ class MbbrDynamics {
   Vec3 relative_mobility() const noexcept;
 
  private:
+  MbbrAccelerations solve(const MbbrMass& mass, const Vec3& b_body, const Vec2& b_ball) const noexcept;
+
   MbbrParameters p_;
-  Vec3 body_inertia_;  // about the ball's centre, with the wheels
+  Vec3 inverse_body_inertia_;  // about the ball's centre, with the wheels
   double ball_inertia_;
 };
 

@@ -1,6 +1,7 @@
 #include "robots/mbbr/world.hpp"
 
 #include "equipoise/plant/coulomb.hpp"
+#include "equipoise/plant/integrator.hpp"
 
 namespace equipoise {
 namespace {
@@ -15,15 +16,30 @@ Vec<13> start_state(NoiseStream& noise, double sigma) {
 
 }  // namespace
 
+MbbrParameters as_built(MbbrParameters p, const ActualScales& actual) noexcept {
+  p.m_t *= actual.body_mass;
+  p.l *= actual.com_height;
+  p.I_t1 *= actual.body_inertia;
+  p.I_t2 *= actual.body_inertia;
+  p.I_t3 *= actual.body_inertia;
+  p.m_b *= actual.ball_mass;
+  p.r *= actual.ball_radius;
+  p.I_b *= actual.ball_mass * actual.ball_radius * actual.ball_radius;
+  p.r_w *= actual.wheel_radius;
+  const double gearing = actual.ball_radius / actual.wheel_radius;  // wheels and rotors stay what they are
+  p.I_w *= gearing * gearing;
+  return p;
+}
+
 MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
                      const Calibration& calibration, const MbbrWorldParams& world)
-    : robot_(robot),
+    : robot_(as_built(robot, world.common.actual)),
       world_(world),
-      kinematics_(robot),
-      dynamics_(robot),
+      kinematics_(robot_),
+      dynamics_(robot_),
       mobility_(dynamics_.relative_mobility()),
       motors_(motor, calibration, world.common),
-      drive_(robot, motor, world.drive),
+      drive_(robot_, world.drive),
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
       s_(start_state(start_noise_, world.common.initial_tilt_rad)),
@@ -40,10 +56,6 @@ Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& r
   return limit;
 }
 
-Vec3 MbbrWorld::viscous_torque_B(const Vec3& relative_rate_B) const noexcept {
-  return -(robot_.mu_v + world_.extra_viscous_N_m_s) * relative_rate_B;
-}
-
 /// On a slope the whole weight pulls the ball downhill, yaw frame, N.
 Vec2 MbbrWorld::slope_pull_star(double theta_z) const noexcept {
   const Vec2& slope = world_.common.floor_slope_rad;
@@ -51,42 +63,60 @@ Vec2 MbbrWorld::slope_pull_star(double theta_z) const noexcept {
   return rotate(-theta_z, Vec2(-(robot_.m_t + robot_.m_b) * kGravity_m_s2 * slope));
 }
 
-MbbrAccelerations MbbrWorld::accelerations(const State& s, const Vec3& friction_B,
-                                           const Vec2& push_W) const noexcept {
-  const MbbrMotion m = motion(s);
-  const Vec3 relative = MbbrDynamics::encoder_rate_B(m);
-  Vec3 tau = drive_.torque_B(motors_, relative) + friction_B;
-  if (world_.common.friction) tau += viscous_torque_B(relative);
-  Vec3 push_B = Vec3::Zero();
+MbbrWorld::Instant MbbrWorld::without_coulomb(const State& s, const Vec2& push_W) const noexcept {
+  Instant now;
+  now.motion = motion(s);
+  now.mass = dynamics_.mass(now.motion);
+  const Vec3 relative = MbbrDynamics::encoder_rate_B(now.motion);
+  MbbrLoads loads;
+  loads.tau_B = drive_.torque_B(motors_, relative);
+  if (world_.common.friction) loads.tau_B -= (robot_.mu_v + world_.extra_viscous_N_m_s) * relative;
+  const double theta_z = s(kTheta + 2);
   if (!push_W.isZero(0.0)) {
-    const Mat3 R_WB = rotation(quaternion_of(s.segment<3>(kTheta)));
-    push_B = R_WB.transpose() * Vec3(push_W.x(), push_W.y(), 0.0);
+    loads.push_B = now.motion.R().topRows<2>().transpose() * rotate(-theta_z, push_W);
   }
-  return dynamics_.accelerations(m, tau, push_B, slope_pull_star(s(kTheta + 2)));
+  loads.pull_star = slope_pull_star(theta_z);
+  now.a = dynamics_.accelerations(now.motion, now.mass, loads);
+  return now;
 }
 
-MbbrWorld::State MbbrWorld::derivative(const State& s, const Vec3& friction_B,
-                                       const Vec2& push_W) const noexcept {
-  const MbbrMotion m = motion(s);
-  const MbbrAccelerations a = accelerations(s, friction_B, push_W);
-  const double theta_z = s(kTheta + 2);
+MbbrWorld::Instant MbbrWorld::with_torque(const Instant& free, const Vec3& torque_B) const noexcept {
+  Instant now = free;
+  const MbbrAccelerations more = dynamics_.response(free.motion, free.mass, torque_B);
+  now.a.omega_dot_B += more.omega_dot_B;
+  now.a.phi_ddot_inertial += more.phi_ddot_inertial;
+  return now;
+}
+
+MbbrWorld::State MbbrWorld::derivative(const State& s, const Instant& now) const noexcept {
+  const MbbrMotion& m = now.motion;
   State d;
   d.segment<3>(kTheta) = m.theta_dot();
-  d.segment<3>(kOmega) = a.omega_dot_B;
-  d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, a);
-  d.segment<2>(kPhi) = rotate(theta_z, m.phi_dot_star);
+  d.segment<3>(kOmega) = now.a.omega_dot_B;
+  d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, now.a);
+  d.segment<2>(kPhi) = rotate(s(kTheta + 2), m.phi_dot_star);
   d.segment<3>(kRelative) = drive_.seen_rate_B(MbbrDynamics::encoder_rate_B(m));
   return d;
 }
 
 /// Per axis, the constant torque that would end this step at rest, limited to friction's: sticking and
 /// sliding in one rule.
-Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept {
+Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Instant& free) const noexcept {
   if (!world_.common.friction) return Vec3::Zero();
   const double h = world_.common.step_s;
-  const State next = s + h * derivative(s, Vec3::Zero(), push_W);
-  const Vec3 limit = friction_limit_N_m(world_, robot_.mu_c, MbbrDynamics::encoder_rate_B(motion(s)));
+  const State next = s + h * derivative(s, free);
+  const Vec3 limit = friction_limit_N_m(world_, robot_.mu_c, MbbrDynamics::encoder_rate_B(free.motion));
   return uncoupled_coulomb_torque<3>(MbbrDynamics::encoder_rate_B(motion(next)), mobility_, h, limit);
+}
+
+Felt MbbrWorld::felt(const Instant& now) const noexcept {
+  Felt felt;
+  felt.time_s = time_s_;
+  felt.omega_B_rad_s = now.motion.omega_B;
+  felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(now.motion, now.a);
+  felt.wheel_angle_rad.head<3>() =
+      kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) + drive_.encoder_offset_rad();
+  return felt;
 }
 
 void MbbrWorld::disturb() {
@@ -108,21 +138,31 @@ void MbbrWorld::step(double h) noexcept {
   drive_.begin_step(motors_, MbbrDynamics::encoder_rate_B(motion(s_)),
                     kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
   const Vec2 push = push_now();
-  const Vec3 friction = coulomb_torque_B(s_, push);
-  const State k1 = derivative(s_, friction, push);
-  const State k2 = derivative(s_ + 0.5 * h * k1, friction, push);
-  const State k3 = derivative(s_ + 0.5 * h * k2, friction, push);
-  const State k4 = derivative(s_ + h * k3, friction, push);
-  s_ += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+  const Instant free = without_coulomb(s_, push);
+  const Vec3 friction = coulomb_torque_B(s_, free);
+  const Instant now = with_torque(free, friction);
+  if (sensors_.aged()) sensors_.feel(felt(now));
+  s_ = rk4_step(s_, derivative(s_, now), h, [&](const State& s) {
+    return derivative(s, with_torque(without_coulomb(s, push), friction));
+  });
   time_s_ += h;
 }
 
 void MbbrWorld::advance(const MotorCommand& command) {
   if (command.enable) held_ = false;
-  const int steps = static_cast<int>(std::lround(kTickS / world_.common.step_s));
+  const double h = world_.common.step_s;
+  const int steps = static_cast<int>(std::lround(kTickS / h));
+  const double taken_at = world_.common.actuation_steps();
   for (int i = 0; i < steps && !held_; ++i) {
-    if (i == world_.common.actuation_latency_steps) motors_.command(command);
-    step(world_.common.step_s);
+    const double part = taken_at - i;
+    if (part > 0.0 && part < 1.0) {  // the PWM takes the duty within this step
+      step(part * h);
+      motors_.command(command);
+      step((1.0 - part) * h);
+    } else {
+      if (part == 0.0) motors_.command(command);
+      step(h);
+    }
   }
   if (held_) {
     time_s_ += kTickS;
@@ -133,21 +173,18 @@ void MbbrWorld::advance(const MotorCommand& command) {
 }
 
 RawSample MbbrWorld::sense() {
-  const MbbrMotion m = motion(s_);
   TrueMotion now;
   now.time_s = time_s_;
   now.theta_rad = s_.segment<3>(kTheta);
-  now.omega_B_rad_s = m.omega_B;
+  const Instant free = without_coulomb(s_, push_now());
+  const Felt here = felt(held_ ? free : with_torque(free, coulomb_torque_B(s_, free)));
+  now.omega_B_rad_s = here.omega_B_rad_s;
+  now.specific_force_B_m_s2 = here.specific_force_B_m_s2;
   if (held_) {
     now.specific_force_B_m_s2 =
         rotation(quaternion_of(now.theta_rad)).transpose() * Vec3(0.0, 0.0, kGravity_m_s2);
-  } else {
-    const Vec2 push = push_now();
-    const MbbrAccelerations a = accelerations(s_, coulomb_torque_B(s_, push), push);
-    now.specific_force_B_m_s2 = -dynamics_.accelerometer_B(m, a);
   }
-  const Vec3 wheels = kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) + drive_.encoder_offset_rad();
-  for (int i = 0; i < 3; ++i) now.wheel_angle_rad[static_cast<std::size_t>(i)] = wheels(i);
+  for (int i = 0; i < 3; ++i) now.wheel_angle_rad[static_cast<std::size_t>(i)] = here.wheel_angle_rad(i);
   now.battery_V = motors_.battery_V();
   return sensors_.sense(now);
 }

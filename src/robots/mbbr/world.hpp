@@ -20,6 +20,9 @@ struct MbbrWorldParams {
   Vec<10> process_noise_sigma = Vec<10>::Zero();  // per tick: theta x y z, phi x y, and their rates
 };
 
+/// The robot as it is built, where the firmware has `nominal`.
+MbbrParameters as_built(MbbrParameters nominal, const ActualScales& actual) noexcept;
+
 /// Largest friction torque about each body axis at these relative rates.
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept;
 
@@ -35,20 +38,29 @@ class MbbrWorld {
   RawSample sense();
 
   MbbrEstimate truth() const noexcept;
+  const MbbrParameters& robot() const noexcept { return robot_; }  // as built
   double time_s() const noexcept { return time_s_; }
   bool held() const noexcept { return held_; }
   double battery_V() const noexcept { return motors_.battery_V(); }
 
  private:
-  /// Attitude, body rates, ball rates, ball angles (inertial), relative ball angle; 3 + 3 + 2 + 2 + 3.
+  /// Attitude, body rates, ball rates (yaw frame), ball angles (inertial), relative ball angle; 3 + 3 + 2 + 2
+  /// + 3.
   using State = Vec<13>;
+  /// The forces of one instant and what they do.
+  struct Instant {
+    MbbrMotion motion;
+    MbbrMass mass;
+    MbbrAccelerations a;
+  };
   static MbbrMotion motion(const State& s) noexcept;
-  MbbrAccelerations accelerations(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
-  State derivative(const State& s, const Vec3& friction_B, const Vec2& push_W) const noexcept;
-  Vec3 coulomb_torque_B(const State& s, const Vec2& push_W) const noexcept;
-  Vec3 viscous_torque_B(const Vec3& relative_rate_B) const noexcept;
+  Instant without_coulomb(const State& s, const Vec2& push_W) const noexcept;
+  Instant with_torque(const Instant& free, const Vec3& torque_B) const noexcept;
+  State derivative(const State& s, const Instant& now) const noexcept;
+  Vec3 coulomb_torque_B(const State& s, const Instant& free) const noexcept;
   Vec2 slope_pull_star(double theta_z) const noexcept;
   Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
+  Felt felt(const Instant& now) const noexcept;
   void step(double h) noexcept;
   void disturb();
 

@@ -113,7 +113,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
-    c.world[i] = read_mip_world(world.table(kFidelityNames[i]), &c.world_bridge[i]);
+    c.world[i] = read_mip_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
   }
   world.finish();
   root.finish();

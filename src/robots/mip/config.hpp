@@ -30,8 +30,8 @@ struct MipConfig {
   MipLqrParams lqr;
   SafetyParams safety;
   AttitudeFilterParams attitude;
-  std::array<MipWorldParams, 3> world;       // by Fidelity
-  std::array<BridgeType, 3> world_bridge{};  // what the simulated robot is built with
+  std::array<MipWorldParams, 4> world;       // by Fidelity
+  std::array<BridgeType, 4> world_bridge{};  // what the simulated robot is built with
 
   MipSlcPipeline::Params slc_pipeline() const;
   MipLqrPipeline::Params lqr_pipeline() const;

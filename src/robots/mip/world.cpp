@@ -1,6 +1,7 @@
 #include "robots/mip/world.hpp"
 
 #include "equipoise/plant/coulomb.hpp"
+#include "equipoise/plant/integrator.hpp"
 
 namespace equipoise {
 namespace {
@@ -20,12 +21,26 @@ Vec<8> start_state(NoiseStream& noise, double sigma) {
 
 }  // namespace
 
+MipParameters as_built(MipParameters p, const ActualScales& actual) noexcept {
+  p.m_b *= actual.body_mass;
+  p.l *= actual.com_height;
+  p.I_b1 *= actual.body_inertia;
+  p.I_b2 *= actual.body_inertia;
+  p.I_b3 *= actual.body_inertia;
+  p.r *= actual.wheel_radius;
+  const double square = actual.wheel_radius * actual.wheel_radius;  // the same mass on a larger wheel
+  p.I_w1 *= square;
+  p.I_w2 *= square;
+  p.I_w3 *= square;
+  return p;
+}
+
 MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
                    const MipWorldParams& world)
-    : robot_(robot),
+    : robot_(as_built(robot, world.common.actual)),
       world_(world),
-      kinematics_(robot),
-      dynamics_(robot),
+      kinematics_(robot_),
+      dynamics_(robot_),
       motors_(motor, calibration, world.common),
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
@@ -82,19 +97,19 @@ Vec3 MipWorld::accelerations(const State& s, const Vec2& wheel_torque) const noe
   return a;
 }
 
-MipWorld::State MipWorld::derivative(const State& s, const Vec2& friction) const noexcept {
+MipWorld::State MipWorld::derivative(const State& s, const Vec3& accelerations) const noexcept {
   State d;
   d.segment<3>(kTheta) = s.segment<3>(kThetaDot);
-  d.segment<3>(kThetaDot) = accelerations(s, gear_torque(s) + friction);
+  d.segment<3>(kThetaDot) = accelerations;
   const double speed = lifted() ? 0.0 : -robot_.r * (s(kPhiDot) + s(kThetaDot));
   d.segment<2>(kPosition) = rotate(s(kPsi), Vec2(0.0, speed));
   return d;
 }
 
-Vec2 MipWorld::friction_torque(const State& s) const noexcept {
+Vec2 MipWorld::friction_torque(const State& s, const Vec2& gear_torque) const noexcept {
   if (!world_.common.friction) return Vec2::Zero();
   const double h = world_.common.step_s;
-  const State next = s + h * derivative(s, Vec2::Zero());
+  const State next = s + h * derivative(s, accelerations(s, gear_torque));
   const Vec2 now = wheel_rates(s);
   const Stiction& stiction = world_.common.stiction;
   Vec2 limit = robot_.mu_c * world_.drivetrain.friction_gain;
@@ -103,13 +118,13 @@ Vec2 MipWorld::friction_torque(const State& s) const noexcept {
 }
 
 /// The motor's side of each gear over one step.
-void MipWorld::cross_backlash() noexcept {
+void MipWorld::cross_backlash(double step_s) noexcept {
   const GearPlayParams& gear = world_.drivetrain.gear;
   if (gear.play_rad == 0.0) return;
   const Vec2 rate(gears_[0].rate_rad_s(), gears_[1].rate_rad_s());
   const Vec2 motor = motors_.torque(wheel_rates(s_) + rate);
   for (int i = 0; i < 2; ++i) {
-    const bool touch = gears_[static_cast<std::size_t>(i)].step(gear, motor(i), world_.common.step_s);
+    const bool touch = gears_[static_cast<std::size_t>(i)].step(gear, motor(i), step_s);
     engaged_(i) = touch ? 1.0 : 0.0;
   }
 }
@@ -119,24 +134,53 @@ void MipWorld::disturb() {
   for (int i = 0; i < 6; ++i) s_(i) += process_noise_.gaussian(world_.process_noise_sigma(i));
 }
 
+Felt MipWorld::felt(const Vec3& accelerations) const noexcept {
+  const double sin = std::sin(s_(kTheta));
+  const double cos = std::cos(s_(kTheta));
+  Felt felt;
+  felt.time_s = time_s_;
+  felt.omega_B_rad_s << s_(kThetaDot), sin * s_(kPsiDot), cos * s_(kPsiDot);
+  if (held_ || lifted()) {
+    felt.specific_force_B_m_s2 << 0.0, sin * kGravity_m_s2, cos * kGravity_m_s2;
+  } else {
+    const Vec3 from_com = robot_.l_a - Vec3(0.0, 0.0, robot_.l);
+    felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(motion(s_), accelerations, from_com);
+  }
+  felt.wheel_angle_rad.head<2>() =
+      kinematics_.wheels(s_(kPhi), s_(kPsi)) + Vec2(gears_[0].ahead_rad(), gears_[1].ahead_rad());
+  return felt;
+}
+
+void MipWorld::step(double h) noexcept {
+  if (lifted()) {
+    s_(kThetaDot) = s_(kTheta) < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
+    s_(kPsiDot) = 0.0;
+  }
+  cross_backlash(h);
+  const Vec2 gear = gear_torque(s_);
+  const Vec2 friction = friction_torque(s_, gear);
+  const Vec3 now = accelerations(s_, gear + friction);
+  if (sensors_.aged()) sensors_.feel(felt(now));
+  s_ = rk4_step(s_, derivative(s_, now), h,
+                [&](const State& s) { return derivative(s, accelerations(s, gear_torque(s) + friction)); });
+  time_s_ += h;
+}
+
 void MipWorld::advance(const MotorCommand& command) {
   if (command.enable) held_ = false;
-  const int steps = static_cast<int>(std::lround(kTickS / world_.common.step_s));
+  const double h = world_.common.step_s;
+  const int steps = static_cast<int>(std::lround(kTickS / h));
+  const double taken_at = world_.common.actuation_steps();
   for (int i = 0; i < steps && !held_; ++i) {
-    const double h = world_.common.step_s;
-    if (i == world_.common.actuation_latency_steps) motors_.command(command);
-    if (lifted()) {
-      s_(kThetaDot) = s_(kTheta) < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
-      s_(kPsiDot) = 0.0;
+    const double part = taken_at - i;
+    if (part > 0.0 && part < 1.0) {  // the PWM takes the duty within this step
+      step(part * h);
+      motors_.command(command);
+      step((1.0 - part) * h);
+    } else {
+      if (part == 0.0) motors_.command(command);
+      step(h);
     }
-    cross_backlash();
-    const Vec2 friction = friction_torque(s_);
-    const State k1 = derivative(s_, friction);
-    const State k2 = derivative(s_ + 0.5 * h * k1, friction);
-    const State k3 = derivative(s_ + 0.5 * h * k2, friction);
-    const State k4 = derivative(s_ + h * k3, friction);
-    s_ += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
-    time_s_ += h;
   }
   if (held_) {
     time_s_ += kTickS;
@@ -147,21 +191,14 @@ void MipWorld::advance(const MotorCommand& command) {
 }
 
 RawSample MipWorld::sense() {
+  const Vec2 gear = gear_torque(s_);
+  const Felt here = felt(accelerations(s_, gear + friction_torque(s_, gear)));
   TrueMotion m;
   m.time_s = time_s_;
   m.theta_rad << s_(kTheta), 0.0, s_(kPsi);
-  const double sin = std::sin(s_(kTheta));
-  const double cos = std::cos(s_(kTheta));
-  m.omega_B_rad_s << s_(kThetaDot), sin * s_(kPsiDot), cos * s_(kPsiDot);
-  if (held_ || lifted()) {
-    m.specific_force_B_m_s2 << 0.0, sin * kGravity_m_s2, cos * kGravity_m_s2;
-  } else {
-    const Vec3 a = accelerations(s_, gear_torque(s_) + friction_torque(s_));
-    const Vec3 from_com = robot_.l_a - Vec3(0.0, 0.0, robot_.l);
-    m.specific_force_B_m_s2 = -dynamics_.accelerometer_B(motion(s_), a, from_com);
-  }
-  const Vec2 wheels = kinematics_.wheels(s_(kPhi), s_(kPsi));
-  m.wheel_angle_rad = {wheels.x() + gears_[0].ahead_rad(), wheels.y() + gears_[1].ahead_rad()};
+  m.omega_B_rad_s = here.omega_B_rad_s;
+  m.specific_force_B_m_s2 = here.specific_force_B_m_s2;
+  m.wheel_angle_rad = {here.wheel_angle_rad(0), here.wheel_angle_rad(1)};
   m.battery_V = motors_.battery_V();
   return sensors_.sense(m);
 }

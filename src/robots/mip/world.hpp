@@ -28,6 +28,9 @@ struct MipWorldParams {
   double lift_at_s = -1.0;                      // a hand lifts the robot; negative: never
 };
 
+/// The robot as it is built, where the firmware has `nominal`.
+MipParameters as_built(MipParameters nominal, const ActualScales& actual) noexcept;
+
 class MipWorld {
  public:
   MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
@@ -40,6 +43,7 @@ class MipWorld {
   RawSample sense();
 
   MipEstimate truth() const noexcept;
+  const MipParameters& robot() const noexcept { return robot_; }  // as built
   double time_s() const noexcept { return time_s_; }
   bool held() const noexcept { return held_; }
   double battery_V() const noexcept { return motors_.battery_V(); }
@@ -51,9 +55,11 @@ class MipWorld {
   Vec2 wheel_rates(const State& s) const noexcept;
   Vec2 gear_torque(const State& s) const noexcept;
   Vec3 accelerations(const State& s, const Vec2& wheel_torque) const noexcept;
-  State derivative(const State& s, const Vec2& friction) const noexcept;
-  Vec2 friction_torque(const State& s) const noexcept;
-  void cross_backlash() noexcept;
+  State derivative(const State& s, const Vec3& accelerations) const noexcept;
+  Vec2 friction_torque(const State& s, const Vec2& gear_torque) const noexcept;
+  Felt felt(const Vec3& accelerations) const noexcept;
+  void step(double h) noexcept;
+  void cross_backlash(double step_s) noexcept;
   void disturb();
   bool lifted() const noexcept { return world_.lift_at_s >= 0.0 && time_s_ >= world_.lift_at_s; }
 

@@ -12,7 +12,7 @@ constexpr int kMotors = 3;
 constexpr std::int64_t kPeriod_ns = 5'000'000;
 
 equipoise::MbbrWorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
-  equipoise::MbbrWorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kFull)];
+  equipoise::MbbrWorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kNominal)];
   params.common.seed = seed;
   return params;
 }

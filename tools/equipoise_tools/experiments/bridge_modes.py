@@ -14,9 +14,9 @@ from .runs import simulate
 COVERS = ("Fig. 4.6",)
 PWM_HZ = (500, 1000, 5000, 10000, 20000)
 MODES = {  # the robot's bridge, and whether the firmware inverts it
-    "brake": {"world.full.bridge": "drive_brake"},
-    "coast": {"world.full.bridge": "drive_coast", "motor.invert_bridge": "false"},
-    "coast, compensated": {"world.full.bridge": "drive_coast"},
+    "brake": {"world.nominal.bridge": "drive_brake"},
+    "coast": {"world.nominal.bridge": "drive_coast", "motor.invert_bridge": "false"},
+    "coast, compensated": {"world.nominal.bridge": "drive_coast"},
 }
 SEEDS = (1, 2, 3)
 DURATION_S = 30
@@ -40,9 +40,9 @@ def variance(sets: dict[str, str], pwm_hz: float, seed: int) -> float:
 def run(out_dir: Path) -> Result:
     result = Result(
         title="Attitude variance by bridge mode and PWM frequency (Fig. 4.6)",
-        command="equipoise sim --config config/edumip.toml --set world.full.bridge=drive_coast "
+        command="equipoise sim --config config/edumip.toml --set world.nominal.bridge=drive_coast "
         "--set motor.pwm_hz=20000 [--set motor.invert_bridge=false]",
-        method=f"The eduMIP holds its position for {DURATION_S} s in the full world, {len(SEEDS)} seeds; "
+        method=f"The eduMIP holds its position for {DURATION_S} s in the nominal world, {len(SEEDS)} seeds; "
         "one controller, designed for drive/brake. Compensated: the firmware inverts the drive/coast model; "
         "not compensated: it sends the drive/brake duty.",
         differs="[T] plots no numbers, and its drivers' dead times and diodes are not ours.",

@@ -41,7 +41,7 @@ def run(out_dir: Path) -> Result:
         "controller.",
         differs="Fig. 6.14's bars are not printed as numbers; our linear KF turns with the frame (the "
         "printed one loses its transport term) and takes its attitude from the DMP, so it does not show a KF "
-        "attitude. The gains of Table 6.2 at 1.5 Hz fall in our full world, as those of Table 6.3 do.",
+        "attitude. The gains of Table 6.2 at 1.5 Hz fall in our nominal world, as those of Table 6.3 do.",
     )
     attitude, speed = spin_in_place(result)
     for hz in TABLE_6_2:

@@ -24,7 +24,7 @@ def run(out_dir: Path) -> Result:
         "and the process noise of the simulation is not the robot's.",
     )
     runs = {}
-    for figure, fidelity in (("Fig. 6.4", "thesis"), ("Fig. 6.5", "full")):
+    for figure, fidelity in (("Fig. 6.4", "thesis"), ("Fig. 6.5", "nominal")):
         slopes = {}
         for gain in (0.0, 1.1):
             summary, log = simulate(
@@ -45,7 +45,7 @@ def run(out_dir: Path) -> Result:
     draw(out_dir, runs)
     innovation = {}
     for gain in (0.0, 1.1):
-        records = runs["full", gain][PRINTED]
+        records = runs["nominal", gain][PRINTED]
         innovation[gain] = float(records["normalized_innovation"][1000:].mean())
         result.add("Fig. 6.8", f"mean normalised innovation, compensation {gain:g}", innovation[gain])
     result.check(
@@ -61,7 +61,7 @@ def draw(out_dir: Path, runs: dict) -> None:
     with plt.rc_context(style.RC):
         figure, rows = plt.subplots(2, 2, figsize=(10, 5), layout="constrained", sharex=True)
         for (fidelity, gain), log in runs.items():
-            axes = rows[int(fidelity == "full"), int(gain > 0)]
+            axes = rows[int(fidelity == "nominal"), int(gain > 0)]
             for channel, colour, name in (
                 (PRINTED, style.ESTIMATE, "printed EKF"),
                 (names.TRUTH, style.TRUTH, "truth"),

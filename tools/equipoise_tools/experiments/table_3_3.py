@@ -63,8 +63,8 @@ def run(out_dir: Path) -> Result:
     result = Result(
         title="MIP attitude at high yaw rates (chapter 3)",
         command="./tools/experiments table_3_3",
-        method=f"{DURATION_S:.0f} s of the eduMIP in the full world at 0, 5 and 10 rad/s; all estimators on "
-        f"the same samples, against the plant's truth at {MOCAP_HZ:.0f} Hz with "
+        method=f"{DURATION_S:.0f} s of the eduMIP in the nominal world at 0, 5 and 10 rad/s; all estimators "
+        f"on the same samples, against the plant's truth at {MOCAP_HZ:.0f} Hz with "
         f"{1e3 * MOCAP_SIGMA_RAD:.0f} mrad of noise. The attitude packets control, as in [T].",
         differs="our plant's disturbances are modelled; our EKF knows where the IMU is and weighs friction.",
     )

@@ -25,7 +25,7 @@ def run(out_dir: Path) -> Result:
         title="Estimation errors of the printed EKF (Table 6.1, Fig. 6.13)",
         command="equipoise sim --config config/mbbr.toml --set 'include=[\"fragments/table_6_1.toml\"]' "
         "--estimator ekf13_published --controller scheduled --yaw-hz 0.5",
-        method="Disturbances of the full world as calibrated once for all seven rows by "
+        method="Disturbances of the nominal world as calibrated once for all seven rows by "
         "`python -m equipoise_tools.calibrate_disturbance` (config/fragments/table_6_1.toml); the printed "
         "EKF with the noise of (6.28) estimates, and its estimates control through the scheduled gains.",
         differs="one set of disturbances must explain fourteen errors of a robot whose own controller (6.29) "

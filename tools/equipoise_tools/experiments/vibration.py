@@ -23,7 +23,7 @@ def run(out_dir: Path) -> Result:
     result = Result(
         title="Vibration over drive speed (Fig. 6.24)",
         command="equipoise sim --config config/mbbr.toml --drive-mps 0.2 "
-        f"--set world.full.disturbance.roller_tilt_rad={ROLLER_TILT_RAD}",
+        f"--set world.nominal.disturbance.roller_tilt_rad={ROLLER_TILT_RAD}",
         method="The robot drives without spin at four speeds; the rows of its double-row wheels take turns, "
         "each turning the wheel's torque axis (2.1). Spectrum of the ball's true rate.",
         differs="at 20 cm/s rollers pass our wheels at 68 to 156 rad/s: [T]'s 17-25 rad/s is not this rate "
@@ -57,7 +57,7 @@ def spectra(path: Path, result: Result) -> None:
             _, log = simulate(
                 drive_mps=drive,
                 duration_s=30,
-                sets={"world.full.disturbance.roller_tilt_rad": ROLLER_TILT_RAD},
+                sets={"world.nominal.disturbance.roller_tilt_rad": ROLLER_TILT_RAD},
             )
             t_s = log.seconds(names.TRUTH)
             settled = t_s >= metrics.SETTLE_S
