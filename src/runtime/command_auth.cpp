@@ -1,123 +1,143 @@
 #include "equipoise/runtime/command_auth.hpp"
 
-#include <fcntl.h>
 #include <sodium.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <cerrno>
+#include <algorithm>
+#include <cmath>
 #include <cstring>
-#include <stdexcept>
 #include <vector>
 
 namespace equipoise::runtime {
 namespace {
 
-static_assert(CommandKey::kBytes == crypto_auth_KEYBYTES);
-static_assert(sizeof(signed_command_t::mac) == crypto_auth_BYTES);
+static_assert(sizeof(signed_command_t::mac) == CommandKey::kMacBytes);
+static_assert(sizeof(command_session_t::mac) == CommandKey::kMacBytes);
+static_assert(sizeof(signed_command_t::holder) == CommandKeys::kLongestName);
 
-constexpr std::size_t kHexBytes = 2 * CommandKey::kBytes;
-
-void need_sodium() {
-  if (sodium_init() < 0) throw std::runtime_error("libsodium could not be initialised");
-}
-
-std::vector<std::uint8_t> signed_bytes(signed_command_t message) {
+/// What is proved: a name, NUL, and the message without its proof.
+template <class Message>
+std::vector<std::uint8_t> proved(const std::string& name, Message message) {
   std::memset(message.mac, 0, sizeof message.mac);
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  std::vector<std::uint8_t> bytes(name.begin(), name.end());
+  bytes.push_back(0);
+  const std::size_t begin = bytes.size();
+  bytes.resize(begin + static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), static_cast<int>(begin), static_cast<int>(bytes.size() - begin));
   return bytes;
 }
 
-/// Closes on every way out.
-struct File {
-  int fd;
-  ~File() {
-    if (fd >= 0) close(fd);
-  }
-};
+bool sensible(const signed_command_t& m) {
+  return std::isfinite(m.velocity_W_m_s[0]) && std::isfinite(m.velocity_W_m_s[1]) &&
+         std::isfinite(m.yaw_rate_rad_s) && m.action >= signed_command_t::ASK &&
+         m.action <= signed_command_t::HEADING_RESET && m.sender != 0;
+}
 
 }  // namespace
 
-CommandKey CommandKey::load(const std::string& path) {
-  need_sodium();
-  const File file{open(path.c_str(), O_RDONLY | O_CLOEXEC)};
-  struct stat about {};
-  if (file.fd < 0 || fstat(file.fd, &about) != 0)
-    throw std::runtime_error(path + ": " + std::strerror(errno) + "; make a key with equipoise keygen");
-  if (!S_ISREG(about.st_mode)) throw std::runtime_error(path + ": is no file");
-  if ((about.st_mode & 077U) != 0)
-    throw std::runtime_error(path + ": others may read or write this key; chmod 600 " + path);
-  if (about.st_uid != geteuid() && about.st_uid != 0)
-    throw std::runtime_error(path + ": belongs to another user; chown it to the one who runs this");
-  std::array<char, kHexBytes + 2> text{};
-  const ssize_t size = read(file.fd, text.data(), text.size());
-  std::array<std::uint8_t, kBytes> bytes{};
-  std::size_t decoded = 0;
-  const bool length = size == static_cast<ssize_t>(kHexBytes) ||
-                      (size == static_cast<ssize_t>(kHexBytes) + 1 && text[kHexBytes] == '\n');
-  const bool good =
-      length &&
-      sodium_hex2bin(bytes.data(), bytes.size(), text.data(), kHexBytes, nullptr, &decoded, nullptr) == 0 &&
-      decoded == kBytes;
-  sodium_memzero(text.data(), text.size());
-  if (!good)
-    throw std::runtime_error(path + ": is no key (64 hexadecimal digits); equipoise keygen makes one");
-  CommandKey key(bytes);
-  sodium_memzero(bytes.data(), bytes.size());
-  return key;
+std::string name_in(const std::uint8_t (&bytes)[CommandKeys::kLongestName]) {
+  const std::string name(std::begin(bytes), std::find(std::begin(bytes), std::end(bytes), 0));
+  return is_command_name(name) ? name : "";
 }
 
-void CommandKey::create(const std::string& path) {
-  need_sodium();
-  const File file{open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
-  if (file.fd < 0) throw std::runtime_error(path + ": " + std::strerror(errno));
-  std::array<std::uint8_t, kBytes> bytes{};
-  randombytes_buf(bytes.data(), bytes.size());
-  std::array<char, kHexBytes + 1> text{};
-  sodium_bin2hex(text.data(), text.size(), bytes.data(), bytes.size());
-  text[kHexBytes] = '\n';
-  const bool written = write(file.fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  sodium_memzero(bytes.data(), bytes.size());
-  sodium_memzero(text.data(), text.size());
-  if (written) return;
-  unlink(path.c_str());
-  throw std::runtime_error(path + ": cannot be written");
+void set_name(const std::string& name, std::uint8_t (*bytes)[CommandKeys::kLongestName]) {
+  std::memset(*bytes, 0, sizeof *bytes);
+  std::copy_n(name.begin(), std::min(name.size(), CommandKeys::kLongestName), *bytes);
 }
 
-CommandKey::~CommandKey() { sodium_memzero(bytes_.data(), bytes_.size()); }
-
-void CommandKey::sign(signed_command_t* message) const {
-  const std::vector<std::uint8_t> bytes = signed_bytes(*message);
-  crypto_auth(message->mac, bytes.data(), bytes.size(), bytes_.data());
+void sign(const CommandKeys& keys, const std::string& robot, signed_command_t* message) {
+  keys.commands(name_in(message->holder)).mac(proved(robot, *message), message->mac);
 }
 
-bool CommandKey::signed_by_it(const signed_command_t& message) const {
-  const std::vector<std::uint8_t> bytes = signed_bytes(message);
-  return crypto_auth_verify(message.mac, bytes.data(), bytes.size(), bytes_.data()) == 0;
+bool authentic(const CommandKeys& keys, const std::string& robot, const signed_command_t& message) {
+  const std::string holder = name_in(message.holder);
+  return !holder.empty() && keys.commands(holder).proves(proved(robot, message), message.mac);
 }
 
-CommandGate::CommandGate(const CommandKey& key) : key_(key) {
-  need_sodium();
-  randombytes_buf(session_.session, sizeof session_.session);
+void sign(const CommandKeys& keys, command_session_t* announcement) {
+  keys.announcements().mac(proved("", *announcement), announcement->mac);
 }
 
-bool CommandGate::accept(const signed_command_t& message, Command* out) {
-  const bool finite = std::isfinite(message.velocity_W_m_s[0]) && std::isfinite(message.velocity_W_m_s[1]) &&
-                      std::isfinite(message.yaw_rate_rad_s);
-  if (!key_.signed_by_it(message) ||
-      std::memcmp(message.session, session_.session, sizeof session_.session) != 0 ||
-      message.sequence <= session_.last_sequence || !finite) {
-    ++session_.refused;
-    return false;
+bool authentic(const CommandKeys& keys, const command_session_t& announcement) {
+  return keys.announcements().proves(proved("", announcement), announcement.mac);
+}
+
+CommandGate::CommandGate(const CommandKeys& keys, std::int64_t timeout_ms, const std::string& robot)
+    : keys_(keys), robot_(robot.empty() ? keys.robot() : robot), timeout_ms_(timeout_ms) {
+  randombytes_buf(&said_.session, sizeof said_.session);
+  set_name(robot_, &said_.robot);
+}
+
+bool CommandGate::fresh(std::int64_t heard_ms, std::int64_t now_ms) const {
+  return heard_ms >= 0 && heard_ms <= now_ms && now_ms - heard_ms <= timeout_ms_;
+}
+
+/// A place is given to another only when all that its owner ever signed is too old to count.
+CommandGate::Sender* CommandGate::place_of(std::int64_t id, std::int64_t now_ms) {
+  const auto own =
+      std::find_if(senders_.begin(), senders_.end(), [&](const Sender& s) { return s.id == id; });
+  if (own != senders_.end()) return &*own;
+  const auto free = std::find_if(senders_.begin(), senders_.end(),
+                                 [&](const Sender& s) { return s.id == 0 || !fresh(s.heard_ms, now_ms); });
+  return free == senders_.end() ? nullptr : &(*free = Sender{id, 0, 0});
+}
+
+CommandGate::Verdict CommandGate::accept(const signed_command_t& m, std::int64_t now_ms) {
+  const auto refuse = [this] {
+    if (said_.refused < INT32_MAX) ++said_.refused;
+    return Verdict::kRefused;
+  };
+  if (m.session != said_.session || !fresh(m.heard_ms, now_ms) || !sensible(m) ||
+      !authentic(keys_, robot_, m)) {
+    return refuse();
   }
-  session_.last_sequence = message.sequence;
-  ++session_.accepted;
-  out->velocity_W_m_s = Vec2(message.velocity_W_m_s[0], message.velocity_W_m_s[1]);
-  out->yaw_rate_rad_s = message.yaw_rate_rad_s;
-  out->arm = message.arm != 0;
-  out->heading_reset = message.heading_reset != 0;
-  return true;
+  Sender* const sender = place_of(m.sender, now_ms);
+  // The difference cannot overflow: both are positive.
+  if (sender == nullptr || m.sequence <= sender->sequence || m.sequence - sender->sequence > kLargestJump ||
+      m.heard_ms < sender->heard_ms) {
+    return refuse();
+  }
+  sender->sequence = m.sequence;
+  sender->heard_ms = m.heard_ms;
+  if (said_.accepted < INT32_MAX) ++said_.accepted;
+  if (m.action == signed_command_t::ASK || m.turn != wish_.turn) return Verdict::kTaken;
+  obey(m);
+  return Verdict::kObeyed;
+}
+
+void CommandGate::obey(const signed_command_t& m) {
+  wish_.heard_ms = m.heard_ms;
+  const bool drive = m.action == signed_command_t::DRIVE;
+  wish_.velocity_W_m_s[0] = drive ? m.velocity_W_m_s[0] : 0.0;  // no motion outlives its turn
+  wish_.velocity_W_m_s[1] = drive ? m.velocity_W_m_s[1] : 0.0;
+  wish_.yaw_rate_rad_s = drive ? m.yaw_rate_rad_s : 0.0;
+  if (drive) return;
+  ++wish_.turn;
+  said_.turn = wish_.turn;
+  said_.turn_sender = m.sender;
+  said_.turn_sequence = m.sequence;
+  std::copy(std::begin(m.holder), std::end(m.holder), said_.turn_holder);
+  if (m.action == signed_command_t::HEADING_RESET) {
+    ++wish_.heading_resets;
+  } else if (m.action == signed_command_t::DISARM) {
+    ++wish_.disarms;
+    wish_.arm = false;
+  } else {
+    ++wish_.arms;
+    wish_.arm = true;
+    wish_.arm_until_ms = m.heard_ms + timeout_ms_;
+  }
+}
+
+command_session_t CommandGate::announcement(std::int64_t now_ms, std::int8_t state, std::int64_t to) const {
+  command_session_t out = said_;
+  out.clock_ms = now_ms;
+  out.state = state;
+  out.to = to;
+  const auto sender =
+      std::find_if(senders_.begin(), senders_.end(), [&](const Sender& s) { return to != 0 && s.id == to; });
+  out.sequence = sender == senders_.end() ? 0 : sender->sequence;
+  sign(keys_, &out);
+  return out;
 }
 
 }  // namespace equipoise::runtime

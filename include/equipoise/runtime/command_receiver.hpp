@@ -1,44 +1,55 @@
-// Signed commands from a wire, received on a thread of its own and handed to the tick without locks.
-// In: key, wire -> out: the newest command; half a second without one, velocities go to zero (the
-// reference ramps them down) and the motors stay as they are. Nothing else is ever listened to. latest() is
-// RT-safe.
+// Commands from a wire, judged on a thread of their own and handed to the tick without locks.
+// In: the robot's keys, wire -> out: the newest command and its age; announcements on the wire. Nothing else
+// is ever listened to. latest() and tell() are RT-safe: they read a vDSO clock and atomics.
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
+#include <string>
 #include <thread>
 
 #include "equipoise/runtime/command_auth.hpp"
+#include "equipoise/runtime/command_follower.hpp"
 #include "equipoise/runtime/command_wire.hpp"
-#include "equipoise/runtime/spsc_queue.hpp"
+#include "equipoise/runtime/latest_value.hpp"
 
 namespace equipoise::runtime {
 
+struct CommandReceiverOptions {
+  std::string robot;  // its name; empty: as in the keys
+  double timeout_s = 0.5;
+  /// Told on the receiver's thread who began which turn.
+  std::function<void(const std::string& what)> journal;
+};
+
 class CommandReceiver {
  public:
-  static constexpr int kTimeoutTicks = 100;
-
-  CommandReceiver(const CommandKey& key, std::unique_ptr<CommandWire> wire);
+  CommandReceiver(const CommandKeys& keys, const CommandReceiverOptions& options,
+                  std::unique_ptr<CommandWire> wire);
   ~CommandReceiver();
   CommandReceiver(const CommandReceiver&) = delete;
   CommandReceiver& operator=(const CommandReceiver&) = delete;
 
   /// Once per tick.
   Command latest() noexcept;
+  /// What safety made of it.
+  void tell(ArmState state) noexcept;
 
  private:
-  struct Plain {  // Command without Eigen
-    double x, y, yaw_rate;
-    bool arm, heading_reset;
-  };
+  double now_ms() const noexcept;
   void run();
   void receive(const std::uint8_t* data, std::size_t size);
+  void announce(std::int64_t to);
+  void note(const signed_command_t& message) const;
 
-  SpscQueue<Plain> queue_;
+  const std::int64_t started_ns_;
+  std::function<void(const std::string&)> journal_;
   CommandGate gate_;  // these two: the thread's alone
   std::unique_ptr<CommandWire> wire_;
-  Command current_;
-  int age_ticks_ = 0;
+  LatestValue<CommandWish> wish_;
+  CommandFollower follower_;               // the loop's alone
+  std::atomic<std::int64_t> followed_{0};  // four times the turn, and the motors' state in it
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -2,24 +2,30 @@
 #pragma once
 
 #include "app/cli/commands.hpp"
-#include "equipoise/runtime/command_auth.hpp"
+#include "equipoise/runtime/command_key.hpp"
 
 namespace equipoise::app {
 
-inline runtime::CommandKey load_key(const std::string& path) {
+/// f(), whose complaints are about the user's files and names.
+template <class F>
+auto as_input(F&& f) {
   try {
-    return runtime::CommandKey::load(path);
+    return f();
   } catch (const std::runtime_error& error) {
     throw InputError(error.what());
   }
 }
 
-inline void create_key(const std::string& path) {
-  try {
-    runtime::CommandKey::create(path);
-  } catch (const std::runtime_error& error) {
-    throw InputError(error.what());
-  }
+inline runtime::CommandKeys load_key(const std::string& path) {
+  return as_input([&] { return runtime::CommandKeys::load(path); });
+}
+
+/// What a robot needs: keys from which those of every holder can be had.
+inline runtime::CommandKeys load_robot_key(const std::string& path) {
+  runtime::CommandKeys keys = load_key(path);
+  if (!keys.holder().empty())
+    throw InputError(path + ": is " + keys.holder() + "'s key; the robot needs its own");
+  return keys;
 }
 
 }  // namespace equipoise::app

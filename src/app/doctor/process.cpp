@@ -116,7 +116,7 @@ void examine_key(const Patient& patient, Findings* findings) {
     return;
   }
   try {
-    runtime::CommandKey::load(patient.key);
+    runtime::CommandKeys::load(patient.key);
     findings->ok("command.key", patient.key + " is a key that only its owner reads");
   } catch (const std::runtime_error& error) {
     namespace fs = std::filesystem;

@@ -10,6 +10,7 @@
 #include "app/io/hardware.hpp"
 #include "app/run/announcer.hpp"
 #include "app/run/firmware.hpp"
+#include "equipoise/runtime/command_receiver.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"
 
@@ -37,10 +38,11 @@ struct FlightLimits {
 inline runtime::TickTiming timing_of(const runtime::Supervisor& s) noexcept { return s.timing().now(); }
 inline runtime::TickTiming timing_of(const runtime::NoSupervisor&) noexcept { return {}; }
 
-/// `announcer` may be nullptr.
+/// `announcer` and `receiver` may be nullptr.
 template <class Pipeline, class Commands, class Supervisor>
 Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits& limits,
-           Supervisor& supervisor, runtime::Telemetry& telemetry, Announcer* announcer) {
+           Supervisor& supervisor, runtime::Telemetry& telemetry, Announcer* announcer,
+           runtime::CommandReceiver* receiver) {
   Hardware hardware(io);
   Flight flight;
   runtime::TickRecord record{};
@@ -67,6 +69,7 @@ Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits
     record.overruns = timing.overruns;
     record.dropped_records = telemetry.dropped();
     telemetry.hand_over(record);
+    if (receiver != nullptr) receiver->tell(t.arm_state);
     if (announcer != nullptr) announcer->tell(t.arm_state, t.reasons, t.z.battery_V);
     // Nothing flies unrecorded.
     if (tick >= last_tick || (flight.fell && limits.end_on_fall) || telemetry.log_failed()) done = true;

@@ -35,9 +35,13 @@ struct Arguments {
   std::int64_t log_min_free_mb = 20;  // for others on the disk
   bool arm = false;
   std::string command_key;
+  std::string robot_name;
   std::string command_url = runtime::kDefaultTelemetryUrl;
   WatchOptions watch;
 };
+
+/// Who commands, in the journal.
+void say_on_stderr(const std::string& what) { std::fprintf(stderr, "equipoise: %s\n", what.c_str()); }
 
 /// As in sim: motors half a second after the start, motion after a second.
 Command script(const Arguments& a, double t_s) {
@@ -74,9 +78,10 @@ class Runner {
         config_(Firmware::apply(loaded_.config, a.choice)),
         board_toml_(board_toml) {
     if (!a.command_key.empty()) {
-      const runtime::CommandKey key = load_key(a.command_key);
       receiver_ = std::make_unique<runtime::CommandReceiver>(
-          key, open_wire(a.command_url, runtime::WireSide::kRobot));
+          load_robot_key(a.command_key),
+          runtime::CommandReceiverOptions{a.robot_name, config_.safety.command_timeout_s, say_on_stderr},
+          open_wire(a.command_url, runtime::WireSide::kRobot));
     }
   }
 
@@ -108,7 +113,7 @@ class Runner {
         return receiver_ ? receiver_->latest() : script(a_, static_cast<double>(tick) * kTickS);
       };
       return watched([&](auto& supervisor) {
-        return app::fly(io, pipeline, commands, limits, supervisor, telemetry, announcer);
+        return app::fly(io, pipeline, commands, limits, supervisor, telemetry, announcer, receiver_.get());
       });
     });
     const runtime::TelemetryReport report = telemetry.finish();
@@ -315,6 +320,7 @@ void add_run(Subcommand app) {
               std::string("where to listen with --command-key: ") + kWireHelp +
                   "; on a board also serial or can, as its file says")
       .show_default();
+  command.option("--robot-name", a->robot_name, "its name for senders (default: as in the key)");
   command.option("--estimator", a->choice.estimator, "who controls (default: the robot's)");
   command.option("--controller", a->choice.controller, "state feedback (default: the robot's)");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");

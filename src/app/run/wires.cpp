@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "app/cli/commands.hpp"
+#include "app/run/can_wire.hpp"
 #include "can.h"
 #include "serial.h"
 
@@ -12,9 +13,6 @@ namespace equipoise::app {
 namespace {
 
 using runtime::WireSide;
-
-constexpr std::uint32_t kCommandId = 0x1E1;  // towards the robot
-constexpr std::uint32_t kSessionId = 0x1E2;  // from it
 
 class SerialStream final : public runtime::ByteStream {
  public:
@@ -37,41 +35,20 @@ class SerialStream final : public runtime::ByteStream {
   std::uint32_t baud_;
 };
 
-/// Up to eight bytes of the stream per data frame.
-class CanStream final : public runtime::ByteStream {
+class SocketCanBus final : public CanBus {
  public:
-  CanStream(const std::string& interface, WireSide side)
-      : heard_(side == WireSide::kRobot ? kCommandId : kSessionId),
-        said_(side == WireSide::kRobot ? kSessionId : kCommandId) {
+  explicit SocketCanBus(const std::string& interface) {
     const int status = can_open(&port_, interface.c_str());
     if (status < 0)
       throw std::runtime_error("can: " + interface + ": " + std::strerror(-status) + " (ip link set " +
                                interface + " up type can bitrate 500000)");
   }
-  ~CanStream() override { can_close(&port_); }
-  std::size_t read(std::uint8_t* out, std::size_t size) override {
-    can_frame frame{};
-    std::size_t count = 0;
-    while (count + CAN_MAX_DLEN <= size && can_receive(&port_, &frame) == 0) {
-      if (frame.can_id != heard_) continue;  // others', remote frames
-      std::copy(frame.data, frame.data + frame.can_dlc, out + count);
-      count += frame.can_dlc;
-    }
-    return count;
-  }
-  std::size_t write(const std::uint8_t* data, std::size_t size) override {
-    can_frame frame{};
-    frame.can_id = said_;
-    frame.can_dlc = static_cast<std::uint8_t>(std::min<std::size_t>(size, CAN_MAX_DLEN));
-    std::copy(data, data + frame.can_dlc, frame.data);
-    return can_send(&port_, &frame) == 0 ? frame.can_dlc : 0;
-  }
-  double bytes_per_s() const override { return 10000.0; }  // 250 kbit/s, half of it ours
+  ~SocketCanBus() override { can_close(&port_); }
+  bool receive(can_frame* out) override { return can_receive(&port_, out) == 0; }
+  bool send(const can_frame& frame) override { return can_send(&port_, &frame) == 0; }
 
  private:
   can_port_t port_{};
-  std::uint32_t heard_;
-  std::uint32_t said_;
 };
 
 std::unique_ptr<runtime::ByteStream> open_serial(const std::string& name) {
@@ -89,7 +66,7 @@ std::unique_ptr<runtime::CommandWire> open_wire(const std::string& name, WireSid
   if (name.rfind("serial:", 0) == 0)
     return std::make_unique<runtime::StreamWire>(open_serial(name.substr(7)));
   if (name.rfind("can:", 0) == 0)
-    return std::make_unique<runtime::StreamWire>(std::make_unique<CanStream>(name.substr(4), side));
+    return std::make_unique<CanWire>(std::make_unique<SocketCanBus>(name.substr(4)), side);
   return runtime::open_lcm_wire(name, side);
 }
 

@@ -1,170 +1,198 @@
-// Only holders of the key command the robot, and no message counts twice.
+// Only holders of the key command the robot, and no message counts twice, late or in another turn.
 #include "equipoise/runtime/command_auth.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <random>
-#include <stdexcept>
+#include <vector>
+
+#include "command_fixture.hpp"
 
 namespace equipoise::runtime {
 namespace {
 
-CommandKey key_of(std::uint8_t first) {
-  std::array<std::uint8_t, CommandKey::kBytes> bytes{};
-  bytes[0] = first;
-  return CommandKey(bytes);
+using Verdict = CommandGate::Verdict;
+constexpr std::int64_t kTimeout_ms = 500;
+constexpr auto kDrive = signed_command_t::DRIVE;
+constexpr auto kArm = signed_command_t::ARM;
+constexpr auto kDisarm = signed_command_t::DISARM;
+
+class Gate : public ::testing::Test {
+ protected:
+  Verdict take(const Asked& asked, std::int64_t now_ms = 1000) {
+    return gate_.accept(command_for(gate_, keys_, asked), now_ms);
+  }
+  const CommandWish& wish() const { return gate_.wish(); }
+
+  const CommandKeys keys_ = keys_of(1);
+  CommandGate gate_{keys_, kTimeout_ms};
+};
+
+TEST_F(Gate, TakesWhatTheKeyHolderSends) {
+  ASSERT_EQ(take({1, kDrive}), Verdict::kObeyed);
+  EXPECT_EQ(wish().velocity_W_m_s[0], 0.25);
+  EXPECT_EQ(wish().yaw_rate_rad_s, -1.5);
+  EXPECT_FALSE(wish().arm);
+  EXPECT_EQ(take({5, kDrive}), Verdict::kObeyed);  // lost messages leave gaps
+  const command_session_t said = gate_.announcement(1234, command_session_t::ARMED, 7);
+  EXPECT_EQ(said.accepted, 2);
+  EXPECT_EQ(said.refused, 0);
+  EXPECT_EQ(said.sequence, 5);
+  EXPECT_EQ(said.clock_ms, 1234);
+  EXPECT_TRUE(said.state == command_session_t::ARMED);
+  EXPECT_TRUE(authentic(keys_, said));
+  EXPECT_EQ(gate_.announcement(1234, 0, 8).sequence, 0);  // of a sender it has not heard
 }
 
-signed_command_t command_for(const CommandGate& gate, std::int64_t sequence, const CommandKey& key) {
-  signed_command_t m{};
-  std::memcpy(m.session, gate.session().session, sizeof m.session);
-  m.sequence = sequence;
-  m.velocity_W_m_s[0] = 0.25;
-  m.yaw_rate_rad_s = -1.5;
-  m.arm = 1;
-  key.sign(&m);
-  return m;
+TEST_F(Gate, AQuestionChangesNothing) {
+  take({1, kDrive});
+  EXPECT_EQ(take({2, signed_command_t::ASK}), Verdict::kTaken);
+  EXPECT_EQ(wish().velocity_W_m_s[0], 0.25);
+  EXPECT_EQ(wish().turn, 0);
 }
 
-TEST(CommandGate, TakesWhatTheKeyHolderSends) {
-  CommandGate gate(key_of(1));
-  Command c;
-  ASSERT_TRUE(gate.accept(command_for(gate, 1, key_of(1)), &c));
-  EXPECT_EQ(c.velocity_W_m_s.x(), 0.25);
-  EXPECT_EQ(c.yaw_rate_rad_s, -1.5);
-  EXPECT_TRUE(c.arm);
-  EXPECT_FALSE(c.heading_reset);
-  EXPECT_TRUE(gate.accept(command_for(gate, 5, key_of(1)), &c));  // lost messages leave gaps
-  EXPECT_EQ(gate.session().accepted, 2);
-  EXPECT_EQ(gate.session().refused, 0);
-}
-
-TEST(CommandGate, TakesNoneOfAThousandForgedOrReplayedCommands) {
-  const CommandKey key = key_of(1);
-  CommandGate earlier(key);
-  CommandGate gate(key);
-  Command c;
+TEST_F(Gate, TakesNoneOfAThousandForgedOrReplayedCommands) {
+  CommandGate earlier(keys_, kTimeout_ms);
   std::vector<signed_command_t> heard;
   for (std::int64_t i = 1; i <= 100; ++i) {
-    heard.push_back(command_for(gate, i, key));
-    ASSERT_TRUE(gate.accept(heard.back(), &c));
+    heard.push_back(command_for(gate_, keys_, {i, kDrive}));
+    ASSERT_EQ(gate_.accept(heard.back(), 1000), Verdict::kObeyed);
   }
   std::mt19937 random(7);
   const auto pick = [&random](std::size_t n) { return static_cast<std::size_t>(random() % n); };
-  int accepted = 0;
+  int taken = 0;
   for (int i = 0; i < 1000; ++i) {
     signed_command_t m = heard[pick(heard.size())];  // 0: replayed as it was
-    switch (i % 8) {
+    if (i % 9 > 1) m = command_for(gate_, keys_, {200 + i, kDrive});
+    switch (i % 9) {
       case 1:
-        m = command_for(gate, 1000 + i, key_of(2));
-        break;  // another key
+        m.sequence = 200 + i;
+        break;
       case 2:
-        m.sequence = 1000 + i;
-        break;  // renumbered
-      case 3:   // one bit of the mac turned
-        m = command_for(gate, 1000 + i, key);
+        m = command_for(gate_, keys_of(2), {200 + i, kDrive});
+        break;
+      case 3:
         m.mac[pick(sizeof m.mac)] ^= static_cast<std::uint8_t>(1U << pick(8));
         break;
-      case 4:  // content changed
-        m = command_for(gate, 1000 + i, key);
+      case 4:
         m.velocity_W_m_s[pick(2)] += 0.1;
         break;
-      case 5:  // disarmed to armed
-        m = command_for(gate, 1000 + i, key);
-        m.arm = 0;
+      case 5:
+        m.action = kDisarm;
         break;
       case 6:
-        m = command_for(earlier, 1000 + i, key);
-        break;  // recorded in another session
-      case 7:   // noise
-        for (std::uint8_t& byte : m.mac) byte = static_cast<std::uint8_t>(random());
-        m.sequence = 1000 + i;
+        m = command_for(earlier, keys_, {200 + i, kDrive});
+        break;
+      case 7:
+        set_name("berta", &m.holder);  // somebody else's name
+        break;
+      case 8:
+        m = command_for(gate_, keys_, {200 + i, kDrive}, "mip");  // for another robot with this key
         break;
       default:
         break;
     }
-    accepted += gate.accept(m, &c) ? 1 : 0;
+    taken += gate_.accept(m, 1000) == Verdict::kRefused ? 0 : 1;
   }
-  EXPECT_EQ(accepted, 0);
-  EXPECT_EQ(gate.session().refused, 1000);
-  EXPECT_EQ(gate.session().accepted, 100);
-  EXPECT_TRUE(gate.accept(command_for(gate, 101, key), &c));  // the sender itself is not locked out
+  EXPECT_EQ(taken, 0);
+  EXPECT_EQ(gate_.announcement(0, 0).refused, 1000);
+  EXPECT_EQ(gate_.announcement(0, 0).accepted, 100);
+  EXPECT_EQ(take({101, kDrive}), Verdict::kObeyed);  // the sender itself is not locked out
 }
 
-TEST(CommandGate, RefusesWhatIsSignedButNotFinite) {
-  const CommandKey key = key_of(1);
-  CommandGate gate(key);
-  Command c;
-  signed_command_t m = command_for(gate, 1, key);
+TEST_F(Gate, RefusesWhatIsSignedButMakesNoSense) {
+  signed_command_t m = command_for(gate_, keys_, {1, kDrive});
   m.velocity_W_m_s[1] = std::numeric_limits<double>::quiet_NaN();
-  key.sign(&m);
-  EXPECT_FALSE(gate.accept(m, &c));
+  sign(keys_, "mbbr", &m);
+  EXPECT_EQ(gate_.accept(m, 1000), Verdict::kRefused);
+  EXPECT_EQ(take({2, 5}), Verdict::kRefused);
+  EXPECT_EQ(take({3, -1}), Verdict::kRefused);
+  EXPECT_EQ(take({4, kDrive, 1000, 0, 0}), Verdict::kRefused);  // a sender without a number
 }
 
-TEST(CommandGate, EverySessionIsAnother) {
-  const CommandGate a(key_of(1));
-  const CommandGate b(key_of(1));
-  EXPECT_NE(std::memcmp(a.session().session, b.session().session, sizeof a.session().session), 0);
+TEST_F(Gate, TakesAnAnswerWhileTheAnnouncementIsRecent) {
+  EXPECT_EQ(take({1, kDrive, 1000}, 1000 + kTimeout_ms), Verdict::kObeyed);
+  EXPECT_EQ(take({2, kDrive, 1000}, 1001 + kTimeout_ms), Verdict::kRefused);
+  EXPECT_EQ(take({3, kDrive, 1502}, 1501), Verdict::kRefused);  // it has not said that yet
+  EXPECT_EQ(take({4, kDrive, -1}, 100), Verdict::kRefused);
 }
 
-class KeyFile : public ::testing::Test {
- protected:
-  KeyFile() : path_("/tmp/equipoise-key-" + std::to_string(getpid())) { std::remove(path_.c_str()); }
-  ~KeyFile() override { std::remove(path_.c_str()); }
-
-  std::string complaint() const {
-    try {
-      CommandKey::load(path_);
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "loaded";
-  }
-
-  std::string path_;
-};
-
-TEST_F(KeyFile, IsMadeForItsOwnerAndNeverOverwritten) {
-  CommandKey::create(path_);
-  struct stat about {};
-  ASSERT_EQ(stat(path_.c_str(), &about), 0);
-  EXPECT_EQ(about.st_mode & 0777U, 0600U);
-  EXPECT_EQ(complaint(), "loaded");
-  EXPECT_THROW(CommandKey::create(path_), std::runtime_error);
+TEST_F(Gate, ASequenceGrowsInBoundedJumpsOnly) {
+  EXPECT_EQ(take({0, kDrive}), Verdict::kRefused);
+  EXPECT_EQ(take({-5, kDrive}), Verdict::kRefused);
+  EXPECT_EQ(take({std::numeric_limits<std::int64_t>::max(), kDrive}), Verdict::kRefused);
+  EXPECT_EQ(take({CommandGate::kLargestJump + 1, kDrive}), Verdict::kRefused);
+  EXPECT_EQ(take({CommandGate::kLargestJump, kDrive}), Verdict::kObeyed);
+  EXPECT_EQ(take({CommandGate::kLargestJump, kDrive}), Verdict::kRefused);
+  EXPECT_EQ(take({CommandGate::kLargestJump - 1, kDrive}), Verdict::kRefused);
+  EXPECT_EQ(take({2 * CommandGate::kLargestJump, kDrive}), Verdict::kObeyed);
 }
 
-TEST_F(KeyFile, ThatOthersMayReadIsRefusedWithTheFix) {
-  CommandKey::create(path_);
-  for (const mode_t mode : {0640U, 0604U, 0620U, 0666U}) {
-    ASSERT_EQ(chmod(path_.c_str(), mode), 0);
-    EXPECT_NE(complaint().find("chmod 600 " + path_), std::string::npos) << std::oct << mode;
-  }
+TEST_F(Gate, AnEdgeIsObeyedOncePerTurn) {
+  EXPECT_EQ(take({1, kArm, 1000, 0}), Verdict::kObeyed);
+  EXPECT_TRUE(wish().arm);
+  EXPECT_EQ(wish().arm_until_ms, 1000 + kTimeout_ms);
+  EXPECT_EQ(take({2, kArm, 1000, 0}), Verdict::kTaken);  // said again: a retransmission
+  EXPECT_EQ(take({3, kDrive, 1000, 1}), Verdict::kObeyed);
+  EXPECT_EQ(take({4, kDisarm, 1000, 1}), Verdict::kObeyed);
+  EXPECT_FALSE(wish().arm);
+  EXPECT_EQ(wish().velocity_W_m_s[0], 0.0);                // no motion outlives its turn
+  EXPECT_EQ(take({5, kArm, 1000, 1}), Verdict::kTaken);    // decided before the disarm
+  EXPECT_EQ(take({6, kDrive, 1000, 1}), Verdict::kTaken);  // so is this
+  EXPECT_FALSE(wish().arm);
+  EXPECT_EQ(wish().velocity_W_m_s[0], 0.0);
+  EXPECT_EQ(take({7, kArm, 1000, 2}), Verdict::kObeyed);  // anew, and deliberately
+  EXPECT_EQ(take({8, signed_command_t::HEADING_RESET, 1000, 3}), Verdict::kObeyed);
+  EXPECT_TRUE(wish().arm);
+  EXPECT_EQ(wish().heading_resets, 1);
 }
 
-TEST_F(KeyFile, ThatIsNoKeyIsRefused) {
-  EXPECT_NE(complaint().find("equipoise keygen"), std::string::npos);  // missing
-  for (const std::string& text : {std::string(), std::string("secret\n"), std::string(64, 'g'),
-                                  std::string(63, 'a'), std::string(66, 'a')}) {
-    std::ofstream(path_) << text;
-    ASSERT_EQ(chmod(path_.c_str(), 0600), 0);
-    EXPECT_NE(complaint().find("is no key"), std::string::npos) << text;
-  }
+TEST_F(Gate, SaysWhoBeganTheTurn) {
+  take({9, kArm});
+  const command_session_t said = gate_.announcement(1000, 0);
+  EXPECT_EQ(said.turn, 1);
+  EXPECT_EQ(said.turn_sender, 7);
+  EXPECT_EQ(said.turn_sequence, 9);
+  EXPECT_EQ(name_in(said.turn_holder), "anna");
+  EXPECT_EQ(name_in(said.robot), "mbbr");
 }
 
-TEST_F(KeyFile, SignsTheSameAfterLoading) {
-  CommandKey::create(path_);
-  const CommandKey a = CommandKey::load(path_);
-  const CommandKey b = CommandKey::load(path_);
-  signed_command_t m{};
-  m.sequence = 3;
-  a.sign(&m);
-  EXPECT_TRUE(b.signed_by_it(m));
+TEST_F(Gate, SendersCountEachForItself) {
+  EXPECT_EQ(take({500, kDrive, 1000, 0, 7}), Verdict::kObeyed);
+  EXPECT_EQ(take({1, kDrive, 1000, 0, 8}), Verdict::kObeyed);
+  EXPECT_EQ(take({1, kDrive, 1000, 0, 8}), Verdict::kRefused);
+  EXPECT_EQ(take({501, kDrive, 1000, 0, 7}), Verdict::kObeyed);
+}
+
+TEST_F(Gate, ASendersPlaceIsFreeWhenNothingItSignedCanCount) {
+  for (std::int64_t id = 1; id <= 8; ++id) EXPECT_EQ(take({1, kDrive, 1000, 0, id}), Verdict::kObeyed);
+  EXPECT_EQ(take({1, kDrive, 1100, 0, 9}, 1100), Verdict::kRefused);
+  EXPECT_EQ(take({2, kDrive, 1400, 0, 3}, 1400), Verdict::kObeyed);
+  EXPECT_EQ(take({1, kDrive, 1501, 0, 9}, 1501), Verdict::kObeyed);  // in the first one's place
+  EXPECT_EQ(take({1, kDrive, 1000, 0, 1}, 1501), Verdict::kRefused);
+  EXPECT_EQ(take({2, kDrive, 1400, 0, 3}, 1501), Verdict::kRefused);
+  EXPECT_EQ(take({3, kDrive, 1399, 0, 3}, 1501), Verdict::kRefused);  // answers an older one than its last
+}
+
+TEST_F(Gate, EverySessionIsAnother) {
+  const CommandGate other(keys_, kTimeout_ms);
+  EXPECT_NE(gate_.announcement(0, 0).session, other.announcement(0, 0).session);
+}
+
+TEST_F(Gate, AnnouncementsCannotBeForged) {
+  const command_session_t said = gate_.announcement(1000, command_session_t::ARMED, 7);
+  const auto changed = [&](auto&& change) {
+    command_session_t m = said;
+    change(m);
+    return authentic(keys_, m);
+  };
+  EXPECT_FALSE(changed([](auto& m) { m.state = command_session_t::OFF; }));
+  EXPECT_FALSE(changed([](auto& m) { ++m.turn; }));
+  EXPECT_FALSE(changed([](auto& m) { ++m.sequence; }));
+  EXPECT_FALSE(changed([](auto& m) { m.robot[0] = 'x'; }));
+  EXPECT_FALSE(changed([](auto& m) { m.mac[15] ^= 1; }));
+  EXPECT_FALSE(authentic(keys_of(2), said));
 }
 
 }  // namespace
