@@ -32,6 +32,7 @@ SafetyInputs safety_inputs(const Measurement<Wheels>& z, const StateView& x_hat,
   in.battery_V = z.battery_V;
   in.accel_m_s2 = z.accel_B_m_s2.norm();
   for (int i = 0; i < Wheels; ++i) in.wheel_rate_rad_s[static_cast<std::size_t>(i)] = z.wheel_rate_rad_s(i);
+  in.bridge_fault = z.bridge_fault;
   in.command_age_s = asked.age_s;
   in.arm_requested = asked.arm;
   in.encoders_in_check = check.running();

@@ -35,6 +35,7 @@ class Senses {
     z.imu_gap = fresh.imu_gap;
     z.attitude_ok = fresh.attitude;
     z.encoder_jump = fresh.encoder_jump;
+    z.bridge_fault = (raw.health & RIO_BRIDGE_FAULT) != 0;
     z.all_finite = finite(raw);
     z.wheel_rate_rad_s = rotor_speed_.update(z.wheel_angle_rad);
     if (own_attitude_) apply(attitude_, z);
