@@ -35,22 +35,17 @@ void CommandReceiver::receive(const std::uint8_t* data, std::size_t size) {
                command.heading_reset});
 }
 
-Command CommandReceiver::latest() noexcept {
+Command CommandReceiver::latest(std::int64_t now_ns) noexcept {
   Plain next{};
-  current_.heading_reset = false;  // once per command
-  age_ticks_ = std::min(age_ticks_ + 1, kTimeoutTicks);
   while (queue_.pop(&next)) {
-    current_.velocity_W_m_s = Vec2(next.x, next.y);
-    current_.yaw_rate_rad_s = next.yaw_rate;
-    current_.arm = next.arm;
-    current_.heading_reset = current_.heading_reset || next.heading_reset;
-    age_ticks_ = 0;
+    Command command;
+    command.velocity_W_m_s = Vec2(next.x, next.y);
+    command.yaw_rate_rad_s = next.yaw_rate;
+    command.arm = next.arm;
+    command.heading_reset = next.heading_reset;
+    latest_.renew(command, now_ns);
   }
-  if (age_ticks_ >= kTimeoutTicks) {
-    current_.velocity_W_m_s.setZero();
-    current_.yaw_rate_rad_s = 0.0;
-  }
-  return current_;
+  return latest_.at(now_ns);
 }
 
 }  // namespace equipoise::runtime

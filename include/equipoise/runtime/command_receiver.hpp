@@ -1,6 +1,5 @@
 // Signed commands from a wire, received on a thread of its own and handed to the tick without locks.
-// In: key, wire -> out: the newest command; half a second without one, velocities go to zero (the
-// reference ramps them down) and the motors stay as they are. Nothing else is ever listened to. latest() is
+// In: key, wire -> out: the newest command and its age. Nothing else is ever listened to. latest() is
 // RT-safe.
 #pragma once
 
@@ -10,21 +9,20 @@
 
 #include "equipoise/runtime/command_auth.hpp"
 #include "equipoise/runtime/command_wire.hpp"
+#include "equipoise/runtime/latest_command.hpp"
 #include "equipoise/runtime/spsc_queue.hpp"
 
 namespace equipoise::runtime {
 
 class CommandReceiver {
  public:
-  static constexpr int kTimeoutTicks = 100;
-
   CommandReceiver(const CommandKey& key, std::unique_ptr<CommandWire> wire);
   ~CommandReceiver();
   CommandReceiver(const CommandReceiver&) = delete;
   CommandReceiver& operator=(const CommandReceiver&) = delete;
 
   /// Once per tick.
-  Command latest() noexcept;
+  Command latest(std::int64_t now_ns) noexcept;
 
  private:
   struct Plain {  // Command without Eigen
@@ -37,8 +35,7 @@ class CommandReceiver {
   SpscQueue<Plain> queue_;
   CommandGate gate_;  // these two: the thread's alone
   std::unique_ptr<CommandWire> wire_;
-  Command current_;
-  int age_ticks_ = 0;
+  LatestCommand latest_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

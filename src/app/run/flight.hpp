@@ -34,13 +34,10 @@ struct FlightLimits {
   bool end_on_fall = true;
 };
 
-inline runtime::TickTiming timing_of(const runtime::Supervisor& s) noexcept { return s.timing().now(); }
-inline runtime::TickTiming timing_of(const runtime::NoSupervisor&) noexcept { return {}; }
-
 /// `announcer` may be nullptr.
-template <class Pipeline, class Commands, class Supervisor>
+template <class Pipeline, class Commands>
 Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits& limits,
-           Supervisor& supervisor, runtime::Telemetry& telemetry, Announcer* announcer) {
+           runtime::Supervisor& supervisor, runtime::Telemetry& telemetry, Announcer* announcer) {
   Hardware hardware(io);
   Flight flight;
   runtime::TickRecord record{};
@@ -61,15 +58,15 @@ Flight fly(rio_t io, Pipeline& pipeline, Commands&& commands, const FlightLimits
       flight.fell_at_s = static_cast<double>(tick) * kTickS;
     }
     record_tick(tick, now_ns, raw, command, t, pipeline, &record);
-    const runtime::TickTiming timing = timing_of(supervisor);
+    const runtime::TickTiming& timing = supervisor.timing().now();
     record.wake_late_ns = timing.wake_late_ns;
     record.compute_ns = timing.compute_ns;
     record.overruns = timing.overruns;
     record.dropped_records = telemetry.dropped();
     telemetry.hand_over(record);
     if (announcer != nullptr) announcer->tell(t.arm_state, t.reasons, t.z.battery_V);
-    // Nothing flies unrecorded.
-    if (tick >= last_tick || (flight.fell && limits.end_on_fall) || telemetry.log_failed()) done = true;
+    const bool unrecorded = (t.inhibit & kLogFailed) != 0;  // the motors are off for it
+    if (tick >= last_tick || (flight.fell && limits.end_on_fall) || unrecorded) done = true;
     if (interrupted.load(std::memory_order_relaxed)) done = true;
   };
   const runtime::LoopEnd end = runtime::run_loop(hardware, pipeline, commands, on_tick, done, supervisor);

@@ -82,7 +82,7 @@ class Runner {
 
   const Calibration& calibration() const { return config_.calibration; }
 
-  /// `watched(f)` calls f with the loop's supervisor.
+  /// `watched(log_failed, f)` calls f with the loop's supervisor.
   template <class Watched>
   Outcome fly_once(rio_t io, int number, Announcer* announcer, Watched&& watched) {
     Outcome outcome;
@@ -103,11 +103,11 @@ class Runner {
     const FlightLimits limits{a_.duration_s, a_.backend != "board"};
     outcome.flight = Firmware::with_pipeline(config_, a_.choice.controller, [&](auto& pipeline) {
       ServiceNotify service;
-      const auto commands = [&](std::int64_t tick, std::int64_t) {
-        service.tick(tick);
-        return receiver_ ? receiver_->latest() : script(a_, static_cast<double>(tick) * kTickS);
+      const auto commands = [&](std::int64_t tick, std::int64_t now_ns) {
+        service.note(tick);
+        return receiver_ ? receiver_->latest(now_ns) : script(a_, static_cast<double>(tick) * kTickS);
       };
-      return watched([&](auto& supervisor) {
+      return watched(telemetry.log_failed(), [&](runtime::Supervisor& supervisor) {
         return app::fly(io, pipeline, commands, limits, supervisor, telemetry, announcer);
       });
     });
@@ -203,8 +203,8 @@ int run_lockstep(const Arguments& a) {
   Runner<Firmware> runner(a, a.set, "");
   const LockstepServer server(a.socket);
   std::fprintf(stderr, "waiting for a physics engine on %s\n", a.socket.c_str());
-  const auto nobody = [](auto&& fly) {  // an engine's time has no deadlines
-    runtime::NoSupervisor supervisor;
+  const auto nobody = [](const std::atomic<bool>& log_failed, auto&& fly) {
+    runtime::Supervisor supervisor({nullptr, 0, &log_failed, true});  // an engine's time has no deadlines
     return fly(supervisor);
   };
   Outcome last;
@@ -237,6 +237,7 @@ int run_board(const Arguments& a, const Board& board, const std::string& board_t
   std::vector<std::string> overrides = board.calibration;
   overrides.insert(overrides.end(), a.set.begin(), a.set.end());
   FlightWatch watch(a.watch);  // before the receiver's thread, and before the board is opened
+  watch.note(missing_calibration(board));
   Runner<Firmware> runner(a, overrides, board_toml);
   rio_t io{};
   bbb_error_t error{};
@@ -250,8 +251,9 @@ int run_board(const Arguments& a, const Board& board, const std::string& board_t
     throw std::runtime_error(a.board + ": self-test: " + broken);
   }
   Announcer announcer(board);
-  Outcome outcome = runner.fly_once(io, 1, &announcer,
-                                    [&](auto&& fly) { return watch.fly(std::forward<decltype(fly)>(fly)); });
+  Outcome outcome = runner.fly_once(io, 1, &announcer, [&](const std::atomic<bool>& log_failed, auto&& fly) {
+    return watch.fly(log_failed, std::forward<decltype(fly)>(fly));
+  });
   if (outcome.end == "device")
     outcome.error = std::string("the board's tick failed: ") + std::strerror(-outcome.flight.error);
   return report(a, Firmware::kName, outcome, 1, runner.sha256(), watch.summary());
@@ -333,6 +335,8 @@ void add_run(Subcommand app) {
                "board: a process that stops the motors when this one dies or hangs (default: yes)");
   command.flag("--realtime,!--without-realtime", a->watch.realtime,
                "board: motors only under real-time scheduling (default: yes)");
+  command.flag("--calibrated,!--without-calibration", a->watch.calibrated,
+               "board: motors only with the gyro and accelerometer calibrated (default: yes)");
   command.option("--cpu", a->watch.cpu, "board: the loop's CPU; -1: any").show_default().range(-1, 1023);
   command.option("--priority", a->watch.priority, "board: the loop's SCHED_FIFO priority, below the guard's")
       .show_default()

@@ -32,6 +32,17 @@ void FlightWatch::note(const runtime::Realtime& realtime) {
                realtime.complaint().c_str());
 }
 
+void FlightWatch::note(const std::string& missing_calibration) {
+  summary_["calibrated"] = missing_calibration.empty();
+  if (missing_calibration.empty()) return;
+  if (options_.calibrated) standing_ |= kNotCalibrated;
+  std::fprintf(stderr, "equipoise: warning: %s: %s (equipoise calibrate finds it)\n",
+               options_.calibrated
+                   ? "the motors stay off without a calibration (or say --without-calibration)"
+                   : "running without a calibration",
+               missing_calibration.c_str());
+}
+
 void FlightWatch::note(const runtime::LoopTiming& timing) {
   summary_["wake_late"] = to_json(timing.wake());
   summary_["compute"] = to_json(timing.compute());

@@ -18,6 +18,7 @@ struct WatchOptions {
   std::string board_path;
   bool guard = true;
   bool realtime = true;                   // false: fly without, loudly
+  bool calibrated = true;                 // likewise
   int cpu = -1;                           // -1: wherever the kernel likes
   int priority = runtime::kLoopPriority;  // SCHED_FIFO
 };
@@ -26,12 +27,15 @@ class FlightWatch {
  public:
   explicit FlightWatch(const WatchOptions& options);  // starts the guard; runtime_error when it fails
 
+  /// `missing_calibration`: what the board's calibration lacks, see missing_calibration(); empty: nothing.
+  void note(const std::string& missing_calibration);
+
   /// f(supervisor) under real time; says on stderr what is missing.
   template <class F>
-  auto fly(F&& f) {
+  auto fly(const std::atomic<bool>& log_failed, F&& f) {
     const runtime::Realtime realtime(begin());
     note(realtime);
-    runtime::Supervisor supervisor({}, guard_ ? &guard_->page() : nullptr, standing_);
+    runtime::Supervisor supervisor({guard_ ? &guard_->page() : nullptr, standing_, &log_failed, false});
     auto result = f(supervisor);
     note(supervisor.timing());
     return result;

@@ -7,6 +7,7 @@
 #include "app/io/plant_backend.hpp"
 #include "app/sim/simulate.hpp"
 #include "equipoise/runtime/loop.hpp"
+#include "equipoise/runtime/supervisor.hpp"
 
 namespace equipoise::app {
 
@@ -65,7 +66,8 @@ SimSummary fly(World& world, Pipeline& pipeline, const SimOptions& options, cons
   };
 
   const auto start = std::chrono::steady_clock::now();
-  const runtime::LoopEnd end = runtime::run_loop(hardware, pipeline, commands, on_tick, done);
+  runtime::Supervisor supervisor({nullptr, 0, options.log_failed, true});
+  const runtime::LoopEnd end = runtime::run_loop(hardware, pipeline, commands, on_tick, done, supervisor);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   SimSummary summary = meter.summary(end.ticks, wall_s);

@@ -91,7 +91,7 @@ class Pace {
   Pace(bool realtime, double duration_s, std::FILE* out)
       : realtime_(realtime), duration_s_(duration_s), out_(isatty(fileno(out)) != 0 ? out : nullptr) {}
 
-  void tick(const runtime::TickRecord& r) {
+  void show(const runtime::TickRecord& r) {
     const double t = static_cast<double>(r.now_ns) * 1e-9;
     if (realtime_)
       std::this_thread::sleep_until(
@@ -140,12 +140,12 @@ int run(Arguments a) {
   watch_interrupts();
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   Pace pace(a.realtime, a.options.duration_s, stderr);
+  a.options.log_failed = &telemetry.log_failed();
   const SimSummary summary = simulate<Firmware>(
       loaded.config, a.choice, a.options,
       [&](const runtime::TickRecord& record) {
         telemetry.hand_over(record);
-        if (telemetry.log_failed()) interrupted.store(true);  // nothing flies unrecorded
-        pace.tick(record);
+        pace.show(record);
       },
       interrupted);
   pace.end();
