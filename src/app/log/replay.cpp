@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <optional>
 
 #include "app/cli/commands.hpp"
@@ -78,9 +79,18 @@ class LoggedIo {
   explicit LoggedIo(RunLog& log) : log_(log) {}
 
   int wait_tick(std::int64_t* now_ns) noexcept {
-    if (!log_.next(&now_)) return -ESHUTDOWN;
+    try {
+      if (!log_.next(&now_)) return -ESHUTDOWN;
+    } catch (...) {
+      failure_ = std::current_exception();
+      return -EIO;
+    }
     *now_ns = now_.now_ns;
     return 0;
+  }
+  /// Why the log could not be read on, if it could not.
+  void rethrow() const {
+    if (failure_) std::rethrow_exception(failure_);
   }
   RawSample read() noexcept { return now_.raw; }
   int write(const MotorCommand& /*command*/) noexcept { return 0; }
@@ -91,6 +101,7 @@ class LoggedIo {
  private:
   RunLog& log_;
   runtime::TickRecord now_{};
+  std::exception_ptr failure_;
 };
 
 /// What the runtime held against the motors, then.
@@ -132,6 +143,7 @@ Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other)
     if (other) out.other.add(record.others[*other], tick.truth);
   };
   out.ticks = runtime::run_loop(io, pipeline, commands, on_tick, never, supervisor).ticks;
+  io.rethrow();
   out.incomplete = log.incomplete_ticks();
   out.damaged_bytes = log.damaged_bytes();
   return out;
@@ -149,26 +161,44 @@ std::optional<std::size_t> index_of(const std::string& estimator) {
 }  // namespace
 
 void ReplayErrors::add(const runtime::StateRecord& x, const runtime::StateRecord& truth) {
-  const auto square = [](double a) {
-    return a * a;
-    Replay replay_log(RunLog & log, const std::string& origin, const std::string& other) {
-      return with_robot(log.run().robot, origin, [&](auto firmware) {
-        using Firmware = decltype(firmware);
-        const runtime::RunInfo& info = log.run();
-        Choice choice{info.estimator, info.controller, info.fidelity, false, info.attitude, info.backend};
-        complete<Firmware>(choice);
-        if (!other.empty()) {
-          Choice asked{other, info.controller, "", false, ""};
-          complete<Firmware>(asked);
-          choice.compare = true;
-        }
-        const auto loaded = Firmware::parse(info.config_toml, origin + " (its configuration)");
-        const auto config = Firmware::apply(loaded.config, choice);
-        const std::optional<std::size_t> index = index_of<Firmware>(other);
-        const Replay r = Firmware::with_pipeline(
-            config, choice.controller, [&](auto& pipeline) { return replay(log, pipeline, index); });
-        if (r.ticks == 0) throw InputError(origin + ": holds no whole tick");
-        return r;
-      });
+  const auto square = [](double a) { return a * a; };
+  for (std::size_t i = 0; i < 2; ++i) {
+    attitude += square(x.theta_rad[i] - truth.theta_rad[i]) / 2.0;
+    rate += square(x.phi_dot_rad_s[i] - truth.phi_dot_rad_s[i]) / 2.0;
+    position += square(x.position_W_m[i] - truth.position_W_m[i]);
+  }
+  ++ticks;
+}
+
+nlohmann::json ReplayErrors::json(double radius_m) const {
+  if (ticks == 0) return nullptr;
+  const auto n = static_cast<double>(ticks);
+  return {{"attitude_rmse_rad", std::sqrt(attitude / n)},
+          {"rolling_rate_rmse_rad_s", std::sqrt(rate / n)},
+          {"rolling_speed_rmse_m_s", radius_m * std::sqrt(rate / n)},
+          {"position_rmse_m", std::sqrt(position / n)},
+          {"ticks", ticks}};
+}
+
+Replay replay_log(RunLog& log, const std::string& origin, const std::string& other) {
+  return with_robot(log.run().robot, origin, [&](auto firmware) {
+    using Firmware = decltype(firmware);
+    const runtime::RunInfo& info = log.run();
+    Choice choice{info.estimator, info.controller, info.fidelity, false, info.attitude, info.backend};
+    complete<Firmware>(choice);
+    if (!other.empty()) {
+      Choice asked{other, info.controller, "", false, ""};
+      complete<Firmware>(asked);
+      choice.compare = true;
     }
-  }  // namespace equipoise::app
+    const auto loaded = Firmware::parse(info.config_toml, origin + " (its configuration)");
+    const auto config = Firmware::apply(loaded.config, choice);
+    const std::optional<std::size_t> index = index_of<Firmware>(other);
+    const Replay r = Firmware::with_pipeline(config, choice.controller,
+                                             [&](auto& pipeline) { return replay(log, pipeline, index); });
+    if (r.ticks == 0) throw InputError(origin + ": holds no whole tick");
+    return r;
+  });
+}
+
+}  // namespace equipoise::app

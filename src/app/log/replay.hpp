@@ -31,24 +31,6 @@ struct ReplayErrors {
   /// null when nothing was counted.
   nlohmann::json json(double radius_m) const;
 };
-for (std::size_t i = 0; i < 2; ++i) {
-  attitude += square(x.theta_rad[i] - truth.theta_rad[i]) / 2.0;
-  rate += square(x.phi_dot_rad_s[i] - truth.phi_dot_rad_s[i]) / 2.0;
-  position += square(x.position_W_m[i] - truth.position_W_m[i]);
-}
-++ticks;
-}
-nlohmann::json json(double radius_m) const {
-  if (ticks == 0) return nullptr;
-  const auto n = static_cast<double>(ticks);
-  return {{"attitude_rmse_rad", std::sqrt(attitude / n)},
-          {"rolling_rate_rmse_rad_s", std::sqrt(rate / n)},
-          {"rolling_speed_rmse_m_s", radius_m * std::sqrt(rate / n)},
-          {"position_rmse_m", std::sqrt(position / n)},
-          {"ticks", ticks}};
-}
-}
-;
 
 struct Replay {
   std::int64_t ticks = 0;
