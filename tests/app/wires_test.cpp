@@ -85,12 +85,28 @@ class SerialRemote : public ::testing::Test {
 };
 
 TEST_F(SerialRemote, ObeysTheHolderOfTheKey) {
-  EXPECT_FALSE(robot_->latest().arm);
+  EXPECT_FALSE(robot_->latest(0).arm);
   say(command(1));
   ASSERT_TRUE(heard([](const command_session_t& s) { return s.accepted == 1; }));
-  const Command obeyed = robot_->latest();
+  const Command obeyed = robot_->latest(5'000'000);
   EXPECT_TRUE(obeyed.arm);
   EXPECT_EQ(obeyed.velocity_W_m_s.x(), 0.1);
+  EXPECT_EQ(obeyed.age_s, 0.0);
+}
+
+TEST_F(SerialRemote, ASilentRemotesCommandStaysAndGrowsOld) {
+  say(command(1));
+  ASSERT_TRUE(heard([](const command_session_t& s) { return s.accepted == 1; }));
+  (void)robot_->latest(5'000'000);
+  const Command old = robot_->latest(905'000'000);
+  EXPECT_TRUE(old.arm);
+  EXPECT_EQ(old.velocity_W_m_s.x(), 0.1);  // what follows from its age is the safety's business
+  EXPECT_DOUBLE_EQ(old.age_s, 0.9);
+}
+
+TEST_F(SerialRemote, ARemoteThatNeverSpokeIsOldFromTheStart) {
+  (void)robot_->latest(1'000'000'000);
+  EXPECT_DOUBLE_EQ(robot_->latest(1'700'000'000).age_s, 0.7);
 }
 
 TEST_F(SerialRemote, RefusesForgeriesReplaysAndNoise) {
