@@ -13,7 +13,7 @@
 
 #include "app/board/board.hpp"
 #include "app/io/fault_backend.hpp"
-#include "app/run/watched_flight.hpp"
+#include "app/run/realtime_session.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 #include "support/trial.hpp"
@@ -124,32 +124,31 @@ std::uint32_t silent_remote() {
 }
 
 /// The session that surrounds a run on the robot, without its guard process.
-std::uint32_t session_reasons(const std::function<void(app::WatchOptions&)>& change,
+std::uint32_t session_reasons(const std::function<void(app::SessionOptions&)>& change,
                               const std::string& missing_calibration) {
-  app::WatchOptions options;
+  app::SessionOptions options;
   options.guard = false;
   options.realtime = false;
   change(options);
-  app::FlightWatch session(options);
-  session.note(missing_calibration);
+  app::RealtimeSession session(options, missing_calibration);
   const std::atomic<bool> log_failed{false};
-  return session.fly(log_failed, [](runtime::Supervisor& supervisor) {
-    Scene scene;
-    scene.supervisor = &supervisor;
-    return mbbr(scene);
-  });
+  Scene scene;
+  scene.supervisor = &session.begin(log_failed);
+  const std::uint32_t seen = mbbr(scene);
+  session.end();
+  return seen;
 }
 
 std::uint32_t board_without_calibration() {
   const std::string path = std::string(EQUIPOISE_SOURCE_DIR) + "/config/boards/robotics_cape_mbbr.toml";
   const app::Board board = app::load_board(path);
   EXPECT_TRUE(board.calibration_file.empty());  // as shipped
-  return session_reasons([](app::WatchOptions&) {}, app::missing_calibration(board));
+  return session_reasons([](app::SessionOptions&) {}, app::missing_calibration(board));
 }
 
 std::uint32_t no_realtime() {
   return session_reasons(
-      [](app::WatchOptions& options) {
+      [](app::SessionOptions& options) {
         options.realtime = true;
         options.cpu = 4096;  // none has so many
       },

@@ -13,7 +13,7 @@
 #include "app/cli/commands.hpp"
 #include "app/io/plant_backend.hpp"
 #include "app/run/firmware.hpp"
-#include "app/run/watched_flight.hpp"
+#include "app/run/realtime_session.hpp"
 #include "equipoise/runtime/loop.hpp"
 
 namespace equipoise::app {
