@@ -26,7 +26,7 @@ struct Recorded {
 template <class Firmware>
 Recorded record(const std::string& path, FaultKind fault, app::Phase phase, std::uint64_t seed) {
   app::Choice choice;
-  choice.fidelity = "full";
+  choice.fidelity = "nominal";
   app::complete<Firmware>(choice);
   const auto loaded = Firmware::load(config_file<Firmware>(), {});
   const auto config = Firmware::apply(loaded.config, choice);

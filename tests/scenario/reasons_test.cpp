@@ -37,7 +37,7 @@ struct Scene {
 /// All reasons that were given in the trial's five seconds.
 template <class Firmware>
 std::uint32_t reasons_of(const Scene& scene) {
-  app::Choice choice{scene.estimator, "", "full", false, ""};
+  app::Choice choice{scene.estimator, "", "nominal", false, ""};
   app::complete<Firmware>(choice);
   const auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), scene.set).config, choice);
   auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), 1);
@@ -184,7 +184,7 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
        scene.arm = false;
        return mbbr(scene);
      }},
-    {kTilt, [] { return mbbr({{"world.full.initial_tilt_rad=0.5"}}); }},
+    {kTilt, [] { return mbbr({{"world.nominal.initial_tilt_rad=0.5"}}); }},
     {kImuStale, [] { return after(app::FaultKind::kImuOff); }},
     {kEncoderStale,
      [] {
@@ -219,7 +219,7 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
     {kRealtimeMissing, no_realtime},
     {kGuardDead, silent_guard},
     {kOverrun, [] { return after(app::FaultKind::kStall50ms); }},
-    {kPickedUp, [] { return mip({{"world.full.lift_at_s=3.0"}}); }},
+    {kPickedUp, [] { return mip({{"world.nominal.lift_at_s=3.0"}}); }},
     {kStall, [] { return held_fast(0.05); }},
     {kSaturated, [] { return held_fast(0.15); }},
     {kWheelSlip,

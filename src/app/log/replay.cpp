@@ -117,6 +117,14 @@ class LoggedSupervisor {
   const LoggedIo& io_;
 };
 
+/// As the run judged it.
+VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept {
+  const double tilt_rad = r.has_truth ? std::hypot(r.truth.theta_rad[0], r.truth.theta_rad[1]) : std::nan("");
+  const double simulated_s = 1e-9 * static_cast<double>(r.now_ns);
+  return {r.has_truth ? simulated_s : static_cast<double>(r.tick) * kTickS, r.arm, r.enable, r.reasons,
+          tilt_rad};
+}
+
 template <class Pipeline>
 Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other) {
   constexpr std::int64_t kSettled = 1000;  // ticks, 5 s
@@ -125,6 +133,7 @@ Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other)
   LoggedSupervisor supervisor(io);
   runtime::TickRecord record{};
   std::int64_t expected = 0;
+  VerdictJudge judge;
   const std::atomic<bool> never{false};
   const auto commands = [&](std::int64_t, std::int64_t) {
     decltype(Pipeline::Result::x_hat) known;
@@ -138,12 +147,14 @@ Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other)
     expected = tick.tick + 1;
     record_tick(tick.tick, now_ns, raw, command, result, pipeline, &record);
     compare(tick, record, &out.difference);
+    judge.observe(judged(tick));
     if (!tick.has_truth || tick.tick < kSettled) return;
     out.logged.add(tick.estimate, tick.truth);
     if (other) out.other.add(record.others[*other], tick.truth);
   };
   out.ticks = runtime::run_loop(io, pipeline, commands, on_tick, never, supervisor).ticks;
   io.rethrow();
+  out.verdict = judge.verdict(false, false);
   out.incomplete = log.incomplete_ticks();
   out.damaged_bytes = log.damaged_bytes();
   return out;

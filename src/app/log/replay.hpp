@@ -8,6 +8,7 @@
 
 #include "app/cli/json.hpp"
 #include "app/log/run_log.hpp"
+#include "app/run/verdict.hpp"
 
 namespace equipoise::app {
 
@@ -37,6 +38,7 @@ struct Replay {
   std::int64_t incomplete = 0;  // ticks of which the log lost a part
   std::size_t damaged_bytes = 0;
   std::int64_t missing = 0;  // ticks that the log lost
+  Verdict verdict;           // of what the log holds; that a run was interrupted is not in its ticks
   Difference difference;
   ReplayErrors logged, other;
 

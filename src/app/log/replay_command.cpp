@@ -30,20 +30,22 @@ nlohmann::json to_json(const Arguments& a, const runtime::RunInfo& run, const Re
   }
   nlohmann::json errors = {{run.estimator, r.logged.json(run.rolling_radius_m)}};
   if (!a.estimator.empty()) errors[a.estimator] = r.other.json(run.rolling_radius_m);
-  return {{"log", a.log},
-          {"robot", run.robot},
-          {"estimator", run.estimator},
-          {"controller", run.controller},
-          {"fidelity", run.fidelity},
-          {"ticks", r.ticks},
-          {"identical", r.identical()},
-          {"first_difference", difference},
-          {"missing_ticks", r.missing},
-          {"incomplete_ticks", r.incomplete},
-          {"damaged_bytes", r.damaged_bytes},
-          {"errors", errors},
-          {"log_version", run.version},
-          {"version", version()}};
+  nlohmann::json out{{"log", a.log},
+                     {"robot", run.robot},
+                     {"estimator", run.estimator},
+                     {"controller", run.controller},
+                     {"fidelity", run.fidelity},
+                     {"ticks", r.ticks},
+                     {"identical", r.identical()},
+                     {"first_difference", difference},
+                     {"missing_ticks", r.missing},
+                     {"incomplete_ticks", r.incomplete},
+                     {"damaged_bytes", r.damaged_bytes},
+                     {"errors", errors},
+                     {"log_version", run.version},
+                     {"version", version()}};
+  r.verdict.write(&out);
+  return out;
 }
 
 void print(std::FILE* out, const Arguments& a, const runtime::RunInfo& run, const Replay& r) {
@@ -61,6 +63,7 @@ void print(std::FILE* out, const Arguments& a, const runtime::RunInfo& run, cons
   } else {
     std::fprintf(out, "  estimate, control and duty are the same, bit for bit\n");
   }
+  std::fprintf(out, "  %s\n", r.verdict.sentence().c_str());
   const auto errors = [&](const std::string& name, const ReplayErrors& e) {
     if (e.ticks == 0) return;
     const nlohmann::json j = e.json(run.rolling_radius_m);
