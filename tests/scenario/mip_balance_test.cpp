@@ -25,7 +25,8 @@ TEST_P(MipBalance, HoldsAMinuteForEverySeed) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const app::SimSummary s =
         run(controller, yaw_rate, seed, 60.0, {"world.nominal.bridge=" + std::string(bridge)});
-    EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s, reasons " << s.verdict.reasons;
+    EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s, reasons "
+                                   << s.verdict.reasons;
     EXPECT_NEAR(2.0 * kPi * s.yaw_rate_mean_hz, yaw_rate, 0.05) << "seed " << seed;
     EXPECT_LE(s.controlling.attitude_rmse_rad, 0.010) << "seed " << seed;
   }
@@ -46,8 +47,8 @@ TEST(Mip, FiltersWithoutTheLeverArmFailAtTenRadiansPerSecond) {
 }
 
 TEST(Mip, ThePublishedControllerBalancesToo) {
-  EXPECT_FALSE(
-      run("slc", 0.0, 1, 30.0, {"controller.slc.published=true", "world.nominal.backlash_rad=0.0"}).verdict.fell());
+  EXPECT_FALSE(run("slc", 0.0, 1, 30.0, {"controller.slc.published=true", "world.nominal.backlash_rad=0.0"})
+                   .verdict.fell());
 }
 
 TEST(Mip, RecoversFromAPush) {
