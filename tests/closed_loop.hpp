@@ -1,10 +1,13 @@
-// The MBBR through pipeline and world, one tick at a time, so that a test can interfere with the sample or
-// the command in between. With the default controller: ClosedLoop.
+// The MBBR through loop, pipeline and world, one tick at a time, so that a test can interfere with the sample
+// or the command in between. With the default controller: ClosedLoop.
 #pragma once
 
 #include <string>
 
-#include "app/evaluate/mbbr_rig.hpp"
+#include "app/io/plant_backend.hpp"
+#include "app/run/firmware.hpp"
+#include "equipoise/runtime/loop.hpp"
+#include "support/stepped_io.hpp"
 
 namespace equipoise {
 
@@ -12,34 +15,62 @@ inline MbbrConfig mbbr_config() {
   return load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", {}).config;
 }
 
+struct ClosedLoopOptions {
+  Fidelity fidelity = Fidelity::kNominal;
+  std::uint64_t seed = 1;
+  MbbrEstimatorId estimator = MbbrEstimatorId::kEkf;
+  bool compare = false;
+
+  std::size_t level() const { return static_cast<std::size_t>(fidelity); }
+  app::Choice choice() const {
+    return {kMbbrEstimatorNames[static_cast<std::size_t>(estimator)], "", kFidelityNames[level()], compare};
+  }
+};
+
+inline MbbrThesisPipeline::Params pipeline_params(const MbbrConfig& config, const MbbrThesisPipeline*) {
+  return config.thesis_pipeline();
+}
+inline MbbrScheduledPipeline::Params pipeline_params(const MbbrConfig& config, const MbbrScheduledPipeline*) {
+  return config.scheduled_pipeline();
+}
+
 template <class Pipeline>
 class ClosedLoopWith {
  public:
   using Result = typename Pipeline::Result;
 
-  explicit ClosedLoopWith(const app::MbbrRigOptions& options = {}, const MbbrConfig& config = mbbr_config())
-      : rig(config, options), hardware_(rig.backend.io()) {}
+  explicit ClosedLoopWith(const ClosedLoopOptions& options = {}, const MbbrConfig& configured = mbbr_config())
+      : config(app::MbbrFirmware::apply(configured, options.choice())),
+        world(app::MbbrFirmware::world(config, options.level(), options.seed)),
+        pipeline(pipeline_params(config, static_cast<const Pipeline*>(nullptr))),
+        backend_(world),
+        hardware_(backend_.io()) {}
 
-  /// `interfere(RawSample&, Command&)` runs between sensors and pipeline.
+  /// One tick; `interfere(RawSample&, Command&)` runs between sensors and pipeline.
   template <class Interfere>
-  Result tick(Command command, Interfere&& interfere) {
-    std::int64_t now_ns = 0;
-    hardware_.wait_tick(&now_ns);
-    RawSample raw = hardware_.read();
-    interfere(raw, command);
-    rig.pipeline.estimators().observe_truth(rig.world.truth());
-    const Result result = rig.pipeline.tick(raw, command);
-    hardware_.write(result.motors);
-    return result;
+  Result step(const Command& command, Interfere&& interfere) {
+    Command asked = command;
+    const auto spoil = [&](RawSample& raw) { interfere(raw, asked); };
+    const auto commands = [&](std::int64_t, std::int64_t) {
+      pipeline.estimators().observe_truth(world.truth());
+      return asked;
+    };
+    Result last;
+    const auto keep = [&last](std::int64_t, std::int64_t, const RawSample&, const Command&, const Result& t) {
+      last = t;
+    };
+    SteppedIo io(hardware_, 1, spoil);
+    (void)runtime::run_loop(io, pipeline, commands, keep, never_);
+    return last;
   }
 
-  Result tick(const Command& command) {
-    return tick(command, [](RawSample&, Command&) {});
+  Result step(const Command& command) {
+    return step(command, [](RawSample&, Command&) {});
   }
 
   Result run(double seconds, const Command& command) {
-    Result last = tick(command);
-    for (int i = 1; i < static_cast<int>(seconds * kTickHz); ++i) last = tick(command);
+    Result last = step(command);
+    for (int i = 1; i < static_cast<int>(seconds * kTickHz); ++i) last = step(command);
     return last;
   }
 
@@ -55,10 +86,14 @@ class ClosedLoopWith {
     return command;
   }
 
-  app::MbbrRigWith<Pipeline> rig;
+  const MbbrConfig config;
+  MbbrWorld world;
+  Pipeline pipeline;
 
  private:
+  app::PlantBackend<MbbrWorld> backend_;
   app::Hardware hardware_;
+  const std::atomic<bool> never_{false};
 };
 
 using ClosedLoop = ClosedLoopWith<MbbrScheduledPipeline>;

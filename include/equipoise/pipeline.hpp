@@ -3,17 +3,11 @@
 // Source: [T] Fig. 6.1, 6.2. RT-safe: fixed size, no allocation, no locks, bounded.
 #pragma once
 
-#include <algorithm>
-
 #include "equipoise/actuate/bridge.hpp"
-#include "equipoise/actuate/encoder_check.hpp"
-#include "equipoise/actuate/safety.hpp"
+#include "equipoise/actuate/safety_inputs.hpp"
 #include "equipoise/control/friction.hpp"
 #include "equipoise/robot_contract.hpp"
-#include "equipoise/sense/attitude_filter.hpp"
-#include "equipoise/sense/calibrate.hpp"
-#include "equipoise/sense/freshness.hpp"
-#include "equipoise/sense/rotor_speed.hpp"
+#include "equipoise/sense/senses.hpp"
 
 namespace equipoise {
 
@@ -53,47 +47,29 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   explicit Pipeline(const Params& p)
       : p_(p),
         kinematics_(p.robot),
+        senses_(p.calibration, freshness_params(p), p.attitude),
         estimators_(p.estimators),
         reference_(p.reference),
         feedback_(p.feedback),
+        encoder_check_(p.safety.encoder_check_drive),
         bridge_(p.motor),
-        freshness_(freshness_params(p)),
-        safety_(p.safety),
-        attitude_(p.attitude),
-        encoder_check_(p.safety.encoder_check_drive) {}
+        safety_(p.safety) {}
 
   /// `inhibit`: SafetyReason bits of the runtime (guard, overruns, ...) that forbid motors.
   Result tick(const RawSample& raw, const Command& asked, std::uint32_t inhibit = 0) noexcept {
     Result t;
-    const Fresh fresh = freshness_.update(raw);
-    const Command command = safety_.timely(asked);
-    t.z = calibrate<Robot::kWheels>(raw, p_.calibration);  // counts -> SI, body axes
-    t.z.imu_ok = fresh.imu;
-    t.z.attitude_ok = fresh.attitude;
-    t.z.wheel_rate_rad_s = rotor_speed_.update(t.z.wheel_angle_rad);
-    if (p_.attitude.own) apply(attitude_, t.z);  // in place of the packets
-
+    t.z = senses_.update(raw);                                         // counts -> SI; what of it is news
     t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
-    if (!safety_.armed()) reference_.reset(t.x_hat);
-    t.ref = reference_.update(command, t.x_hat);  // [T] 6.2.1
-    const EncoderFaults faults = encoder_check_.update(safety_.armed(), duty_previous_, t.z.wheel_angle_rad);
-    t.u_lin = feedback_.update(t.ref) + kinematics_.axes_from_wheels(encoder_check_.drive());  // [T] (6.10)
+    t.ref = follow(safety_.timely(asked), t.x_hat);                    // [T] 6.2.1
+    t.u_lin = feedback_.update(t.ref);                                 // [T] (6.10)
+    t.u_lin += encoder_stimulus(t.z);                                  // shakes each wheel right after arming
     const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);
     t.u_friction = t.u_lin + friction;            // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
-    SafetyInputs checks = safety_inputs(raw, asked, t, faults);
-    checks.imu_gap = fresh.imu_gap;
-    checks.encoder_jump = fresh.encoder_jump;
-    checks.slip_rad_s = slip_rad_s<Robot>(t, kinematics_, 0);
-    checks.inhibit = inhibit;
-    t.motors = safety_.gate(duty, checks);
-    t.arm_state = safety_.state();
-    t.reasons = safety_.reasons();
-    t.inhibit = inhibit;
-
+    t.motors = safety_.gate(duty, checks(t, asked, inhibit));
     u_previous_ = applied_input(t, friction);
     duty_previous_ = wheel_duty(t.motors);
-    return t;
+    return judged(t, inhibit);
   }
 
   Estimators& estimators() noexcept { return estimators_; }
@@ -101,6 +77,18 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   const Params& params() const noexcept { return p_; }
 
  private:
+  /// Where the robot should be; while the motors are off, where it is.
+  typename Reference::Reference follow(const Command& command,
+                                       const typename Robot::Estimate& x_hat) noexcept {
+    if (!safety_.armed()) reference_.reset(x_hat);
+    return reference_.update(command, x_hat);
+  }
+
+  Input encoder_stimulus(const typename Robot::Sample& z) noexcept {
+    return kinematics_.axes_from_wheels(
+        encoder_check_.update(safety_.armed(), duty_previous_, z.wheel_angle_rad));
+  }
+
   MotorCommand invert_bridges(Result& t) const noexcept {
     const double supply = bridge_.supply_V(t.z.battery_V, t.z.battery_ok);
     const Wheels u = kinematics_.wheels_from_axes(t.u_friction);
@@ -136,31 +124,20 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     return duty;
   }
 
-  SafetyInputs safety_inputs(const RawSample& raw, const Command& command, const Result& t,
-                             const EncoderFaults& faults) const noexcept {
-    SafetyInputs in;
-    in.state = view(t.x_hat, p_.robot);
-    in.imu_ok = t.z.imu_ok;
-    in.encoders_ok = t.z.encoders_ok;
-    in.battery_ok = t.z.battery_ok;
-    in.attitude_ok = t.z.attitude_ok;
-    in.battery_V = t.z.battery_V;
-    in.accel_m_s2 = t.z.accel_B_m_s2.norm();
-    for (int i = 0; i < Robot::kWheels; ++i) {
-      in.wheel_rate_rad_s[static_cast<std::size_t>(i)] = t.z.wheel_rate_rad_s(i);
-    }
+  SafetyInputs checks(const Result& t, const Command& asked, std::uint32_t inhibit) const noexcept {
+    SafetyInputs in = safety_inputs(t.z, view(t.x_hat, p_.robot), encoder_check_, asked);
+    in.slip_rad_s = slip_rad_s<Robot>(t, kinematics_, 0);
     in.saturated = t.saturated;
-    in.command_age_s = command.age_s;
-    in.arm_requested = command.arm;
-    in.encoders_in_check = encoder_check_.running();
-    in.encoders_stuck = faults.stuck;
-    in.encoders_reversed = faults.reversed;
-    in.all_finite = finite(raw) && command.velocity_W_m_s.allFinite() &&
-                    std::isfinite(command.yaw_rate_rad_s) && std::isfinite(command.age_s) &&
-                    in.state.theta_rad.allFinite() && in.state.omega_B_rad_s.allFinite() &&
-                    in.state.phi_rad.allFinite() && in.state.phi_dot_rad_s.allFinite() &&
-                    t.u_friction.allFinite();
+    in.all_finite = in.all_finite && t.u_friction.allFinite();
+    in.inhibit = inhibit;
     return in;
+  }
+
+  Result& judged(Result& t, std::uint32_t inhibit) const noexcept {
+    t.arm_state = safety_.state();
+    t.reasons = safety_.reasons();
+    t.inhibit = inhibit;
+    return t;
   }
 
   static FreshnessParams freshness_params(const Params& p) noexcept {
@@ -184,25 +161,15 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     return 0.0;
   }
 
-  static bool finite(const RawSample& raw) noexcept {
-    const auto all = [](const auto& values) {
-      return std::all_of(std::begin(values), std::end(values), [](double v) { return std::isfinite(v); });
-    };
-    return all(raw.gyro_counts) && all(raw.accel_counts) && all(raw.encoder_counts) &&
-           all(raw.attitude_wxyz) && std::isfinite(raw.battery_counts);
-  }
-
   Params p_;
   typename Robot::Kinematics kinematics_;
-  RotorSpeed<Robot::kWheels> rotor_speed_;
+  Senses<Robot::kWheels> senses_;
   Estimators estimators_;
   Reference reference_;
   Feedback feedback_;
-  Bridge bridge_;
-  Freshness freshness_;
-  Safety safety_;
-  AttitudeFilter attitude_;
   EncoderCheck<Robot::kWheels> encoder_check_;
+  Bridge bridge_;
+  Safety safety_;
   Wheels duty_previous_ = Wheels::Zero();
   Input u_previous_ = Input::Zero();
 };

@@ -37,6 +37,10 @@ struct Measurement {
   bool encoders_ok = false;
   bool battery_ok = false;
   bool attitude_ok = false;
+  bool imu_gap = false;       // more samples were lost than may be
+  bool encoder_jump = false;  // further than a wheel can turn in a tick
+  bool bridge_fault = false;  // a bridge complains
+  bool all_finite = true;     // of the raw sample
 };
 
 /// What a person or a script asks for.

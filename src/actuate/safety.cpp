@@ -9,6 +9,7 @@ namespace {
 constexpr int kBatteryTicks = 100;         // half a second below the limit
 constexpr int kCutoffTicks = 5;            // rides through one conversion's spike
 constexpr int kBatteryUnknownTicks = 400;  // two seconds without a valid conversion
+constexpr int kBridgeTicks = 3;  // the driver has weighed the evidence; one bad read more decides nothing
 constexpr int kFastTicks = 10;
 constexpr int kFallingTicks = 10;
 constexpr double kFreeFall_m_s2 = 0.2 * kGravity_m_s2;
@@ -83,6 +84,7 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
 
 std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs& in) noexcept {
   saturated_ = count(saturated_, !(armed() && in.saturated));
+  bridge_faults_ = count(bridge_faults_, !in.bridge_fault);
   bool stalled = false;
   for (std::size_t i = 0; i < stalled_.size(); ++i) {
     const bool stands = armed() && std::abs(wanted.duty[i]) > kStallDuty &&
@@ -91,6 +93,7 @@ std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs
     stalled = stalled || stalled_[i] > ticks(p_.max_stall_s);
   }
   std::uint32_t reasons = 0;
+  if (bridge_faults_ >= kBridgeTicks) reasons |= kBridgeFault;
   if (stalled) reasons |= kStall;
   if (saturated_ > ticks(p_.max_saturated_s)) reasons |= kSaturated;
   return reasons;

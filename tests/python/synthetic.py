@@ -41,7 +41,13 @@ def _run(robot: str):
     return run
 
 
-def write_log(path: Path, duration_s: float = 10.0, robot: str = "mbbr", fall_at_s: float = math.inf) -> Path:
+def write_log(
+    path: Path,
+    duration_s: float = 10.0,
+    robot: str = "mbbr",
+    fall_at_s: float = math.inf,
+    disarmed_at_s: float = math.inf,  # upright, for a stale IMU
+) -> Path:
     log = lcm.EventLog(str(path), "w", overwrite=True)
     run = _run(robot)
     log.write_event(0, "EQUIPOISE_RUN", run.encode())
@@ -65,6 +71,8 @@ def write_log(path: Path, duration_s: float = 10.0, robot: str = "mbbr", fall_at
         health.utime, health.tick, health.battery_V = utime, tick, 8.0 - 0.01 * t
         health.arm_state = 1 if 0.5 <= t < fall_at_s else (0 if t < 0.5 else 2)
         health.reasons = {1: 0, 0: 1, 2: 2}[health.arm_state]
+        if t >= disarmed_at_s:
+            health.arm_state, health.reasons = 2, 4
         timing = equipoise.timing_t()
         timing.utime, timing.tick, timing.compute_ns = utime, tick, 9000 if tick == 10 else 2000
         timing.overruns, timing.dropped_records = 3, 4

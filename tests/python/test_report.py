@@ -13,7 +13,7 @@ import pytest
 import synthetic
 from equipoise_tools import names, report
 from equipoise_tools.log import read_log
-from equipoise_tools.metrics import summarise
+from equipoise_tools.metrics import outcome, summarise
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +52,22 @@ def test_motion_duty_and_timing_are_those_put_in(summary):
 
 def test_the_permission_to_move_is_told_in_words(tmp_path):
     summary = summarise(read_log(synthetic.write_log(tmp_path / "fall.lcm", fall_at_s=8.0)))
+    assert (summary.ended, summary.reasons) == ("fell", ["tilt"])
     assert summary.fell_at_s == pytest.approx(8.0)
+    assert outcome(summary) == "fell at 8.00 s: tilt"
     assert summary.events == [(0.0, "disarmed, not requested"), (0.5, "armed"), (8.0, "fault, tilt")]
+
+
+def test_a_disarmed_run_is_not_called_upright(tmp_path):
+    summary = summarise(read_log(synthetic.write_log(tmp_path / "off.lcm", disarmed_at_s=7.0)))
+    assert (summary.ended, summary.reasons) == ("disarmed", ["imu stale"])
+    assert outcome(summary) == "motors went off at 7.00 s: imu stale"
+
+
+def test_a_robot_that_was_refused_is_told_so(tmp_path):
+    summary = summarise(read_log(synthetic.write_log(tmp_path / "no.lcm", disarmed_at_s=0.5)))
+    assert summary.ended == "disarmed"
+    assert outcome(summary) == "never armed: imu stale"
 
 
 def test_the_drive_phase_is_the_commanded_one(log):

@@ -81,6 +81,7 @@ def test_the_report_computes_from_the_log_what_the_simulator_computed(equipoise,
     found = summarise(read)
     assert found.robot == told["robot"]
     assert found.ticks == told["ticks"]
+    assert found.ended == told["ended"]
     assert (found.fell_at_s is not None) == told["fell"]
     # The log's time stamps are whole microseconds: 2e-7 of the five seconds that count.
     assert found.yaw_rate_mean_hz == pytest.approx(told["yaw_rate_mean_hz"], rel=5e-7)

@@ -27,8 +27,8 @@ Command spinning() {
 class Tick : public ::testing::TestWithParam<int> {
  protected:
   /// Every estimator runs beside the controlling one.
-  app::MbbrRigOptions options() const {
-    app::MbbrRigOptions o;
+  ClosedLoopOptions options() const {
+    ClosedLoopOptions o;
     o.estimator = static_cast<MbbrEstimatorId>(GetParam());
     o.compare = true;
     return o;
@@ -59,19 +59,19 @@ TEST(AllocationWatchTest, SeesWhatTheTickMustNotDo) {
 
 /// Balances, spins and drives, fails, arms again.
 template <class Loop>
-void fly(Loop& loop) {
+void exercise(Loop& loop) {
   loop.balance(1.0);
   loop.run(2.0, spinning());
-  loop.tick(spinning(), [](RawSample& raw, Command&) { raw.gyro_counts[0] = NAN; });
+  loop.step(spinning(), [](RawSample& raw, Command&) { raw.gyro_counts[0] = NAN; });
   loop.run(0.05, Command{});
   loop.run(0.5, ClosedLoop::armed());
 }
 
 template <class Pipeline>
-std::int64_t allocations_of(const app::MbbrRigOptions& options) {
+std::int64_t allocations_of(const ClosedLoopOptions& options) {
   ClosedLoopWith<Pipeline> loop(options);
   const AllocationWatch watch;
-  fly(loop);
+  exercise(loop);
   return watch.count();
 }
 
@@ -118,8 +118,8 @@ TEST_P(Tick, MakesNoSystemCall) {
   ClosedLoop scheduled(options());
   ClosedLoopWith<MbbrThesisPipeline> thesis(options());
   const int status = status_without_system_calls([&] {
-    fly(scheduled);
-    fly(thesis);
+    exercise(scheduled);
+    exercise(thesis);
   });
   if (status == -1) GTEST_SKIP() << "no seccomp filters here";
   EXPECT_EQ(status, 0) << "killed by a system call in the tick";

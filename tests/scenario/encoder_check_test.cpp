@@ -2,7 +2,7 @@
 // off, the wheel named. And healthy encoders never are.
 #include <gtest/gtest.h>
 
-#include "support/bench_flight.hpp"
+#include "support/trial.hpp"
 
 namespace equipoise {
 namespace {
@@ -24,7 +24,7 @@ TYPED_TEST_SUITE(EncoderCheckOnRobot, Robots);
 TYPED_TEST(EncoderCheckOnRobot, FindsAReversedEncoderAndNamesTheWheel) {
   for (std::size_t wheel = 0; wheel < this->kWheels; ++wheel) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      const FlightEnd end = fly_with<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 2.0,
+      const TrialEnd end = run_trial<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 2.0,
                                                 [&](RawSample& raw) { raw.encoder_counts[wheel] *= -1.0; });
       EXPECT_EQ(end.arm_state, ArmState::kFault) << "wheel " << wheel << " seed " << seed;
       EXPECT_TRUE(end.reasons & kEncoderSign) << "wheel " << wheel << " seed " << seed;
@@ -37,7 +37,7 @@ TYPED_TEST(EncoderCheckOnRobot, FindsAReversedEncoderAndNamesTheWheel) {
 TYPED_TEST(EncoderCheckOnRobot, FindsAStuckEncoderAndNamesTheWheel) {
   for (std::size_t wheel = 0; wheel < this->kWheels; ++wheel) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      const FlightEnd end = fly_with<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 2.0,
+      const TrialEnd end = run_trial<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 2.0,
                                                 [&](RawSample& raw) { raw.encoder_counts[wheel] = 17.0; });
       EXPECT_EQ(end.arm_state, ArmState::kFault) << "wheel " << wheel << " seed " << seed;
       EXPECT_TRUE(end.reasons & kEncoderStuck) << "wheel " << wheel << " seed " << seed;
@@ -50,7 +50,7 @@ TYPED_TEST(EncoderCheckOnRobot, FindsAStuckEncoderAndNamesTheWheel) {
 TYPED_TEST(EncoderCheckOnRobot, LeavesHealthyEncodersAlone) {
   for (const std::string& controller : TypeParam::controllers()) {
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      const FlightEnd end = fly_with<TypeParam>(this->choice(controller), seed, 1.0, [](RawSample&) {});
+      const TrialEnd end = run_trial<TypeParam>(this->choice(controller), seed, 1.0, [](RawSample&) {});
       EXPECT_EQ(end.arm_state, ArmState::kArmed)
           << controller << " seed " << seed << " reasons " << end.reasons;
     }
@@ -60,8 +60,8 @@ TYPED_TEST(EncoderCheckOnRobot, LeavesHealthyEncodersAlone) {
 TEST(PickUp, TurnsTheMotorsOffWhenTheWheelsLoseTheGround) {
   for (const std::string controller : {"slc", "lqr"}) {
     const app::Choice choice{"ekf", controller, "nominal", false, ""};
-    const FlightEnd end =
-        fly_with<app::MipFirmware>(choice, 1, 8.0, [](RawSample&) {}, {"world.nominal.lift_at_s=3.0"});
+    const TrialEnd end =
+        run_trial<app::MipFirmware>(choice, 1, 8.0, [](RawSample&) {}, {"world.nominal.lift_at_s=3.0"});
     EXPECT_EQ(end.arm_state, ArmState::kFault) << controller;
     EXPECT_TRUE(end.reasons & (kPickedUp | kSaturated)) << controller << " reasons " << end.reasons;
   }

@@ -50,7 +50,7 @@ TEST_P(ThesisController, HoldsTheIdealWorldWithTrueStatesForEverySeed) {
     o.seed = static_cast<std::uint64_t>(seed);
     o.fidelity = Fidelity::kIdeal;
     const SimSummary s = run(o, MbbrEstimatorId::kTruth);
-    EXPECT_FALSE(s.fell) << "seed " << seed << " at " << s.fell_at_s << " s";
+    EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s";
     EXPECT_NEAR(s.yaw_rate_mean_hz, o.yaw_hz, 0.01);
     EXPECT_LT(s.position_rmse_m, 0.10);
   }
@@ -69,7 +69,7 @@ TEST_P(KfAttitude, HoldsTheThesisWorldForEverySeed) {
     o.seed = static_cast<std::uint64_t>(seed);
     o.fidelity = Fidelity::kThesis;
     const SimSummary s = run(o, MbbrEstimatorId::kKfAttitude);
-    EXPECT_FALSE(s.fell) << "seed " << seed << " at " << s.fell_at_s << " s";
+    EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s";
   }
 }
 INSTANTIATE_TEST_SUITE_P(DriveRates, KfAttitude, testing::Values(Drive{0.0, 0.20}, Drive{0.5, 0.20}));
@@ -87,7 +87,7 @@ TEST_P(Comparison, CorrectedFiltersBeatThePrintedOneOnTheSameSamples) {
       o.fidelity = fidelity;
       o.compare = true;
       const SimSummary s = run(o, MbbrEstimatorId::kEkf);
-      ASSERT_FALSE(s.fell);
+      ASSERT_FALSE(s.verdict.fell());
       const auto& printed = s.estimators.at("ekf13_published");
       for (const char* name : {"ekf", "ekf13"}) {
         const auto& corrected = s.estimators.at(name);
@@ -109,7 +109,7 @@ TEST_P(Defaults, SpinAndDriveInTheFullWorld) {
     o.drive_mps = GetParam().drive_mps;
     o.seed = static_cast<std::uint64_t>(seed);
     const SimSummary s = run(o, MbbrEstimatorId::kEkf);
-    EXPECT_FALSE(s.fell) << "seed " << seed << " at " << s.fell_at_s << " s";
+    EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s";
     EXPECT_NEAR(s.yaw_rate_mean_hz, o.yaw_hz, 0.02);
     EXPECT_LT(s.controlling.attitude_rmse_rad, 0.02);
   }
@@ -139,11 +139,11 @@ TEST(Simulation, APrintedSlcSignOrEulerRatesFallWhereOursHold) {
   o.duration_s = 60.0;
   o.drive_mps = 0.1;
   o.fidelity = Fidelity::kIdeal;
-  EXPECT_FALSE(run(o, MbbrEstimatorId::kTruth).fell);
-  EXPECT_TRUE(run(o, MbbrEstimatorId::kTruth, {"reference.slc_sign=-1.0"}).fell);
+  EXPECT_FALSE(run(o, MbbrEstimatorId::kTruth).verdict.fell());
+  EXPECT_TRUE(run(o, MbbrEstimatorId::kTruth, {"reference.slc_sign=-1.0"}).verdict.fell());
   o.yaw_hz = 1.0;
-  EXPECT_FALSE(run(o, MbbrEstimatorId::kTruth).fell);
-  EXPECT_TRUE(run(o, MbbrEstimatorId::kTruth, {"reference.rate_feedback=euler"}).fell);
+  EXPECT_FALSE(run(o, MbbrEstimatorId::kTruth).verdict.fell());
+  EXPECT_TRUE(run(o, MbbrEstimatorId::kTruth, {"reference.rate_feedback=euler"}).verdict.fell());
 }
 
 TEST(Simulation, NoiseThroughTheTorquesBeatsADiagonalUnderFriction) {
@@ -167,7 +167,7 @@ TEST(Simulation, RecoversFromAPush) {
   const std::vector<std::string> push{
       "world.nominal.pushes=[{at_s=5.0, duration_s=0.05, force_N=[4.0, 0.0]}]"};
   const SimSummary s = run(o, MbbrEstimatorId::kEkf, push);
-  EXPECT_FALSE(s.fell);
+  EXPECT_FALSE(s.verdict.fell());
   EXPECT_GT(s.duty_max, run(o, MbbrEstimatorId::kEkf).duty_max) << "the push was felt";
 }
 

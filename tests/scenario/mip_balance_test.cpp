@@ -25,7 +25,8 @@ TEST_P(MipBalance, HoldsAMinuteForEverySeed) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const app::SimSummary s =
         run(controller, yaw_rate, seed, 60.0, {"world.nominal.bridge=" + std::string(bridge)});
-    EXPECT_FALSE(s.fell) << "seed " << seed << " at " << s.fell_at_s << " s, reasons " << s.reasons;
+    EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s, reasons "
+                                   << s.verdict.reasons;
     EXPECT_NEAR(2.0 * kPi * s.yaw_rate_mean_hz, yaw_rate, 0.05) << "seed " << seed;
     EXPECT_LE(s.controlling.attitude_rmse_rad, 0.010) << "seed " << seed;
   }
@@ -37,7 +38,7 @@ INSTANTIATE_TEST_SUITE_P(Cases, MipBalance,
 
 TEST(Mip, FiltersWithoutTheLeverArmFailAtTenRadiansPerSecond) {
   const app::SimSummary s = run("slc", 10.0, 1, 20.0, {}, true);
-  ASSERT_FALSE(s.fell);
+  ASSERT_FALSE(s.verdict.fell());
   // [T] Table 3.3
   for (const char* name : {"complementary", "complementary_kf", "planar_kf"}) {
     EXPECT_GE(s.estimators.at(name).attitude_rmse_rad, 0.08) << name;
@@ -46,8 +47,8 @@ TEST(Mip, FiltersWithoutTheLeverArmFailAtTenRadiansPerSecond) {
 }
 
 TEST(Mip, ThePublishedControllerBalancesToo) {
-  EXPECT_FALSE(
-      run("slc", 0.0, 1, 30.0, {"controller.slc.published=true", "world.nominal.backlash_rad=0.0"}).fell);
+  EXPECT_FALSE(run("slc", 0.0, 1, 30.0, {"controller.slc.published=true", "world.nominal.backlash_rad=0.0"})
+                   .verdict.fell());
 }
 
 TEST(Mip, RecoversFromAPush) {
@@ -56,7 +57,7 @@ TEST(Mip, RecoversFromAPush) {
       quiet[0], "world.nominal.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, 1.0]}]"};
   for (const char* controller : {"slc", "lqr"}) {
     const app::SimSummary s = run(controller, 0.0, 1, 10.0, push);
-    EXPECT_FALSE(s.fell) << controller;
+    EXPECT_FALSE(s.verdict.fell()) << controller;
     EXPECT_GT(s.duty_max, run(controller, 0.0, 1, 10.0, quiet).duty_max) << "the push was felt";
   }
 }

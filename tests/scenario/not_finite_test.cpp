@@ -50,12 +50,12 @@ TEST_P(NotFinite, StopsTheMotorsInTheSameTickAndIsForgottenOnceFiniteAgain) {
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
                            -std::numeric_limits<double>::infinity()}) {
     SCOPED_TRACE(bad);
-    app::MbbrRigOptions options;
+    ClosedLoopOptions options;
     options.compare = true;
     ClosedLoop loop(options);
     ASSERT_TRUE(loop.balance(1.0).motors.enable);
 
-    const ClosedLoop::Result hit = loop.tick(
+    const ClosedLoop::Result hit = loop.step(
         ClosedLoop::armed(), [&](RawSample& raw, Command& command) { GetParam().of(raw, command) = bad; });
     EXPECT_FALSE(hit.motors.enable);
     for (const double duty : hit.motors.duty) EXPECT_EQ(duty, 0.0);
@@ -63,15 +63,15 @@ TEST_P(NotFinite, StopsTheMotorsInTheSameTickAndIsForgottenOnceFiniteAgain) {
     EXPECT_NE(hit.reasons & kNotFinite, 0U);
 
     // Asking on does not help; asking again does, once six encoder samples are good.
-    EXPECT_FALSE(loop.tick(ClosedLoop::armed()).motors.enable);
-    for (int i = 0; i < 6; ++i) EXPECT_FALSE(loop.tick(Command{}).motors.enable);
-    EXPECT_TRUE(loop.tick(ClosedLoop::armed()).motors.enable);
+    EXPECT_FALSE(loop.step(ClosedLoop::armed()).motors.enable);
+    for (int i = 0; i < 6; ++i) EXPECT_FALSE(loop.step(Command{}).motors.enable);
+    EXPECT_TRUE(loop.step(ClosedLoop::armed()).motors.enable);
     const ClosedLoop::Result after = loop.run(2.0, ClosedLoop::armed());
     EXPECT_TRUE(after.motors.enable);
-    EXPECT_LT(loop.rig.world.truth().theta_xy.norm(), 0.15);
+    EXPECT_LT(loop.world.truth().theta_xy.norm(), 0.15);
     for (std::size_t i = 0; i < MbbrEstimators::kCount; ++i) {
       const auto id = static_cast<MbbrEstimatorId>(i);
-      EXPECT_TRUE(finite(view(loop.rig.pipeline.estimators().estimate(id), loop.rig.config.robot)))
+      EXPECT_TRUE(finite(view(loop.pipeline.estimators().estimate(id), loop.config.robot)))
           << kMbbrEstimatorNames[i];
     }
   }
@@ -81,7 +81,7 @@ TEST_P(NotFinite, RefusesToArm) {
   ClosedLoop loop;
   loop.run(0.5, Command{});
   for (int i = 0; i < 20; ++i) {
-    const ClosedLoop::Result t = loop.tick(ClosedLoop::armed(), [&](RawSample& raw, Command& command) {
+    const ClosedLoop::Result t = loop.step(ClosedLoop::armed(), [&](RawSample& raw, Command& command) {
       GetParam().of(raw, command) = std::numeric_limits<double>::quiet_NaN();
     });
     ASSERT_FALSE(t.motors.enable);

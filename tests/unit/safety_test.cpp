@@ -52,6 +52,7 @@ const Fault kFaults[] = {
     {"picked_up", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.wheel_rate_rad_s[2] = -95.0; }},
     {"dropped", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.accel_m_s2 = 0.5; }},
     {"saturated", kSaturated, 101, [](SafetyInputs& in, MotorCommand&) { in.saturated = true; }},
+    {"bridge", kBridgeFault, 3, [](SafetyInputs& in, MotorCommand&) { in.bridge_fault = true; }},
     {"stall", kStall, 61, [](SafetyInputs&, MotorCommand& m) { m.duty[0] = -0.95; }},
     {"guard", kGuardDead, 1, [](SafetyInputs& in, MotorCommand&) { in.inhibit = kGuardDead; }},
     {"overrun", kOverrun, 1, [](SafetyInputs& in, MotorCommand&) { in.inhibit = kOverrun; }},

@@ -10,7 +10,7 @@ from scipy.signal import butter, lfilter, lfilter_zi
 
 from . import names, style
 from .log import Log
-from .metrics import Summary, estimator_channels, run_record, tilt_axes
+from .metrics import Summary, estimator_channels, outcome, run_record, tilt_axes
 from .style import plt
 
 SMOOTHING_RAD_S = (
@@ -288,10 +288,7 @@ def draw_report(log: Log, summary: Summary) -> plt.Figure:
             draw(axes)
         for axes in grid.flat[len(panels) :]:
             axes.remove()
-        outcome = (
-            f"fell at {summary.fell_at_s:.1f} s" if summary.fell_at_s is not None else "upright to the end"
-        )
-        figure.suptitle(f"{headline(log, summary)}  ·  {outcome}", fontsize=12, fontweight="bold")
+        figure.suptitle(f"{headline(log, summary)}  ·  {outcome(summary)}", fontsize=12, fontweight="bold")
         if report.traces:
             handles, labels = grid.flat[0].get_legend_handles_labels()
             handles += (

@@ -12,6 +12,9 @@ from .log import Log
 # Errors count from 5 s on, as in `equipoise sim --json`; less half a tick, for time stamps are rounded.
 SETTLE_S = 5.0 - 0.0025
 FALLEN_RAD = 0.6  # the safety gate's default tilt limit
+# The verdict's words and limits are those of src/app/run/verdict.cpp.
+SURELY_FALLING_RAD = 0.9 * FALLEN_RAD
+PATIENCE_S = 0.1  # between the request and armed motors
 SATURATED = 1.0 - 1e-9
 
 
@@ -33,7 +36,9 @@ class Summary:
     duration_s: float
     ticks: int
     armed_s: float
-    fell_at_s: float | None
+    ended: str  # finished, fell or disarmed; what else ended a run is not in its ticks
+    reasons: list[str]
+    fell_at_s: float | None  # when it fell or was disarmed
     yaw_rate_mean_hz: float | None = None
     duty_max: float | None = None
     saturated_fraction: float | None = None
@@ -136,24 +141,64 @@ def safety_events(log: Log) -> list[tuple[float, str]]:
     return events
 
 
-def fell_at(log: Log) -> float | None:
-    channel = names.TRUTH if names.TRUTH in log else names.STATE
-    if channel not in log:
-        return None
-    tilt = np.linalg.norm(log[channel]["theta_rad"][:, : tilt_axes(log)], axis=1)
-    over = np.flatnonzero(tilt > FALLEN_RAD)
-    return float(log.seconds(channel)[over[0]]) if over.size else None
+def true_tilt_at(log: Log, ticks: np.ndarray) -> np.ndarray:
+    """NaN where nobody knew it."""
+    tilt = np.full(ticks.size, np.nan)
+    if names.TRUTH in log:
+        truth = log[names.TRUTH]
+        _, i, j = np.intersect1d(ticks, truth["tick"], return_indices=True)
+        tilt[i] = np.linalg.norm(truth["theta_rad"][j][:, : tilt_axes(log)], axis=1)
+    return tilt
+
+
+def verdict(log: Log) -> tuple[str, list[str], float | None]:
+    """How it ended, the reasons against the motors then, and when it fell or was disarmed."""
+    if names.HEALTH not in log:
+        return "finished", [], None
+    health, t_s = log[names.HEALTH], log.seconds(names.HEALTH)
+    reasons = health["reasons"]
+    asked = (reasons & 1 << names.SAFETY_REASONS.index("not requested")) == 0
+    driven = health["arm_state"] == names.ARM_STATES.index("armed")
+    tilt = true_tilt_at(log, health["tick"])
+    fallen = tilt > FALLEN_RAD
+    lost = np.flatnonzero(fallen | (asked & ~driven & np.logical_or.accumulate(driven)))
+    if lost.size:
+        i = lost[0]
+        falling = reasons[i] & 1 << names.SAFETY_REASONS.index("tilt") and not tilt[i] < SURELY_FALLING_RAD
+        ended = "fell" if fallen[i] or falling else "disarmed"
+    else:
+        i = health.size - 1
+        unasked = np.flatnonzero(~asked)
+        asked_from_s = t_s[min(unasked[-1] + 1, i)] if unasked.size else t_s[0]
+        refused = asked[i] and not driven.any() and t_s[i] > asked_from_s + PATIENCE_S
+        ended = "disarmed" if refused else "finished"
+    why = names.bits(int(reasons[i]), names.SAFETY_REASONS)
+    return ended, why, None if ended == "finished" else float(t_s[i])
+
+
+def outcome(summary: Summary) -> str:
+    why = f": {', '.join(summary.reasons)}" if summary.reasons else ""
+    if summary.ended == "fell":
+        return f"fell at {summary.fell_at_s:.2f} s{why}"
+    if summary.ended == "disarmed" and not summary.armed_s:
+        return f"never armed{why}"
+    if summary.ended == "disarmed":
+        return f"motors went off at {summary.fell_at_s:.2f} s{why}"
+    return f"ended with the motors off{why}" if why else "upright to the end"
 
 
 def summarise(log: Log) -> Summary:
     best = names.TRUTH if names.TRUTH in log else names.STATE
     longest = max((channel for channel in log if channel != names.RUN), key=lambda channel: log[channel].size)
+    ended, reasons, fell_at_s = verdict(log)
     summary = Summary(
         robot=robot_of(log),
         duration_s=log.duration_s,
         ticks=log[longest].size,
         armed_s=0.0,
-        fell_at_s=fell_at(log),
+        ended=ended,
+        reasons=reasons,
+        fell_at_s=fell_at_s,
     )
     if best in log:
         t_s = log.seconds(best)

@@ -7,7 +7,7 @@ import math
 from html import escape
 
 from .log import Log
-from .metrics import Summary, run_record
+from .metrics import Summary, outcome, run_record
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1200px; margin: 2rem auto; }
@@ -34,9 +34,8 @@ def _table(rows: list[tuple[str, ...]], head: tuple[str, ...] = ()) -> str:
 
 def number_rows(summary: Summary) -> list[tuple[str, str]]:
     """What the page's first table and the terminal say."""
-    upright = summary.fell_at_s is None
     rows = [
-        ("outcome", "upright to the end" if upright else f"fell at {summary.fell_at_s:.2f} s"),
+        ("outcome", outcome(summary)),
         ("duration", f"{summary.duration_s:.2f} s, {summary.ticks} ticks, armed {summary.armed_s:.2f} s"),
     ]
     if summary.yaw_rate_mean_hz is not None:

@@ -282,7 +282,7 @@ HEAD = """# Reliability
 Written by `tools/reliability`{arguments}, {cpus} CPUs, kernel {kernel}. Faults enter at the hardware
 boundary (src/app/io/fault_backend.hpp), in simulated time, world of nominal fidelity, default estimator and
 controller. Unsafe is: duty after the deadline of the fault, motors on while lying, a wrong tilt that nobody
-notices, motors off without a reason, arming by itself (src/app/evaluate/fault_flight.hpp). Ticks are 5 ms,
+notices, motors off without a reason, arming by itself (src/app/evaluate/fault_run.hpp). Ticks are 5 ms,
 count from the first spoilt one. Times are of this machine, not of a BeagleBone.
 
 | what | wanted | measured | holds |

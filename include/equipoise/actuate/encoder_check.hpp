@@ -1,6 +1,6 @@
 // Do the encoders show what the motors do? Right after arming each wheel in turn is shaken for 80 ms; its
 // encoder must follow.
-// In: armed, duties at the wheels since the last tick, encoder angles -> out: a drive to add; per
+// In: armed, duties at the wheels since the last tick, encoder angles -> out: a drive to add; faults(): per
 // wheel, stuck or reversed. The verdict on the last wheel falls kTicks after arming; from then on, and
 // disarmed, nothing is added. Motor and encoder share a shaft, so this holds for any robot and any
 // controller. Shape, lag and limits were chosen on flights of both robots in the nominal world: a sound
@@ -34,22 +34,28 @@ class EncoderCheck {
 
   bool running() const noexcept { return tick_ >= 0 && tick_ < kTicks; }
 
+  const EncoderFaults& faults() const noexcept { return faults_; }
+
   /// What to add to the wheels' drives in this tick.
-  Vec<N> drive() const noexcept {
+  Vec<N> update(bool armed, const Vec<N>& duty, const Vec<N>& angle_rad) noexcept {
+    observe(armed, duty, angle_rad);
     Vec<N> drive = Vec<N>::Zero();
     if (running()) drive(tick_ / kWindow) = drive_ * sense(tick_ % kWindow);
     return drive;
   }
 
-  EncoderFaults update(bool armed, const Vec<N>& duty, const Vec<N>& angle_rad) noexcept {
+ private:
+  using Samples = std::array<double, static_cast<std::size_t>(kWindow)>;
+
+  void observe(bool armed, const Vec<N>& duty, const Vec<N>& angle_rad) noexcept {
     if (!armed || !(drive_ > 0.0)) {
       tick_ = -1;
       faults_ = {};
       speed_.setZero();
       travel_.setZero();
-      return faults_;
+      return;
     }
-    if (tick_ >= kTicks) return faults_;
+    if (tick_ >= kTicks) return;
     // A wheel with inertia under the drive: the answer's shape is what counts, its size is not known.
     travel_ += speed_ + 0.5 * duty;
     speed_ = kLag * (speed_ + duty);
@@ -63,11 +69,7 @@ class EncoderCheck {
       }
     }
     ++tick_;
-    return faults_;
   }
-
- private:
-  using Samples = std::array<double, static_cast<std::size_t>(kWindow)>;
 
   static double sense(int tick) noexcept {
     if (tick >= kShake) return 0.0;

@@ -57,6 +57,7 @@ struct SafetyInputs {
   bool encoder_jump = false;  // further than a wheel can turn in a tick
   bool battery_ok = false;
   bool attitude_ok = false;
+  bool bridge_fault = false;  // a bridge complains
   double battery_V = 0.0;
   double accel_m_s2 = 0.0;  // magnitude of gravity minus acceleration
   double slip_rad_s = 0.0;  // 0 where the robot cannot tell
@@ -102,6 +103,7 @@ class Safety {
   int battery_low_ = 0;
   int battery_gone_ = 0;
   int battery_unknown_ = 0;
+  int bridge_faults_ = 0;
   int saturated_ = 0;
   int fast_ = 0;
   int falling_ = 0;

@@ -50,7 +50,8 @@ class Telemetry {
   Telemetry& operator=(const Telemetry&) = delete;
 
   void hand_over(const TickRecord& record) noexcept;
-  bool log_failed() const noexcept { return log_failed_.load(std::memory_order_relaxed); }
+  /// For the loop's supervisor.
+  const std::atomic<bool>& log_failed() const noexcept { return log_failed_; }
   std::int64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
   /// Drains, closes and joins; further records are ignored.

@@ -167,7 +167,18 @@ Board load_board(const std::string& path) {
   const auto file = std::filesystem::path(path).parent_path() / board.calibration_file;
   const CalibrationFile calibration = load_calibration(file.string(), board.robot);
   for (const std::string& line : overrides_of(calibration, board.R_BS)) board.calibration.push_back(line);
+  board.gyro_calibrated = calibration.gyro.has_value();
+  board.accel_calibrated = calibration.accel.has_value();
   return board;
+}
+
+std::string missing_calibration(const Board& board) {
+  std::string missing;
+  if (!board.gyro_calibrated) missing += "gyro";
+  if (!board.accel_calibrated) missing += missing.empty() ? "accelerometer" : ", accelerometer";
+  if (missing.empty()) return "";
+  return missing + " not calibrated" +
+         (board.calibration_file.empty() ? "; the board names no calibration file" : "");
 }
 
 Board parse_board(const std::string& text, const std::string& origin) {

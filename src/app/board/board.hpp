@@ -35,7 +35,12 @@ struct Board {
   /// --set overrides: the board's mount rotation and battery scale instead of the configuration's, and what
   /// its calibration file says.
   std::vector<std::string> calibration;
+  bool gyro_calibrated = false;  // by that file
+  bool accel_calibrated = false;
 };
+
+/// What a robot that balances needs and this board's calibration file does not say; empty: nothing.
+std::string missing_calibration(const Board& board);
 
 Board load_board(const std::string& path);
 /// Without reading its calibration file, which may still have to be made.

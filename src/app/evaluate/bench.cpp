@@ -5,13 +5,16 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <memory>
 #include <vector>
 
 #include "app/cli/commands.hpp"
+#include "app/io/plant_backend.hpp"
 #include "app/run/firmware.hpp"
-#include "app/run/watched_flight.hpp"
+#include "app/run/realtime_session.hpp"
+#include "equipoise/runtime/loop.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -50,44 +53,68 @@ class Instructions {
   int fd_ = -1;
 };
 
-/// Recorded samples of a short flight, then the pipeline alone on them.
+/// Plays samples to the loop; motor commands go nowhere.
+class Recording {
+ public:
+  int wait_tick(std::int64_t* now_ns) noexcept {
+    if (next_ == samples.size()) return -ESHUTDOWN;
+    *now_ns = samples[next_].t_ns;
+    return 0;
+  }
+  RawSample read() noexcept { return samples[next_++]; }
+  int write(const MotorCommand& /*command*/) noexcept { return 0; }
+  int motors_off() noexcept { return 0; }
+
+  std::vector<RawSample> samples;
+
+ private:
+  std::size_t next_ = 0;
+};
+
+/// Samples of a short run, then loop and pipeline alone on them.
 template <class Firmware>
 nlohmann::json bench_tick(const Arguments& a) {
   Choice choice;
   complete<Firmware>(choice);
   choice.fidelity = "nominal";
   const auto config = Firmware::apply(Firmware::load(a.config, {}).config, choice);
-  return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);
-    std::vector<RawSample> samples;
+  const auto commands = [](std::int64_t tick, std::int64_t /*now_ns*/) {
     Command command;
-    for (int i = 0; i < a.ticks; ++i) {
-      command.arm = i >= 100;
-      const RawSample raw = world.sense();
-      world.advance(pipeline.tick(raw, command).motors);
-      samples.push_back(raw);
+    command.arm = tick >= 100;
+    return command;
+  };
+  std::atomic<bool> done{false};
+  Recording recording;
+  recording.samples.reserve(static_cast<std::size_t>(a.ticks));
+  auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);
+  PlantBackend backend(world);
+  Hardware simulated(backend.io());
+  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    const auto record = [&](std::int64_t tick, std::int64_t, const RawSample& raw, const auto&...) {
+      recording.samples.push_back(raw);
+      done = tick + 1 >= a.ticks;
+    };
+    (void)runtime::run_loop(simulated, pipeline, commands, record, done);
+  });
+  return Firmware::with_pipeline(config, choice.controller, [&](auto& fresh) {
+    const Instructions instructions;
+    const nlohmann::json before = instructions.count();
+    const std::int64_t start_ns = runtime::monotonic_now_ns();
+    done = false;
+    (void)runtime::run_loop(
+        recording, fresh, commands, [](const auto&...) {}, done);
+    const std::int64_t end_ns = runtime::monotonic_now_ns();
+    const nlohmann::json after = instructions.count();
+    nlohmann::json out{{"robot", Firmware::kName},
+                       {"estimator", choice.estimator},
+                       {"controller", choice.controller},
+                       {"tick_ns", static_cast<double>(end_ns - start_ns) / a.ticks},
+                       {"tick_instructions", nullptr}};
+    if (before.is_number() && after.is_number()) {
+      const auto n = after.get<std::uint64_t>() - before.get<std::uint64_t>();
+      out["tick_instructions"] = static_cast<double>(n) / a.ticks;
     }
-    return Firmware::with_pipeline(config, choice.controller, [&](auto& fresh) {
-      const Instructions instructions;
-      const nlohmann::json before = instructions.count();
-      const std::int64_t start_ns = runtime::monotonic_now_ns();
-      for (int i = 0; i < a.ticks; ++i) {
-        command.arm = i >= 100;
-        (void)fresh.tick(samples[static_cast<std::size_t>(i)], command);
-      }
-      const std::int64_t end_ns = runtime::monotonic_now_ns();
-      const nlohmann::json after = instructions.count();
-      nlohmann::json out{{"robot", Firmware::kName},
-                         {"estimator", choice.estimator},
-                         {"controller", choice.controller},
-                         {"tick_ns", static_cast<double>(end_ns - start_ns) / a.ticks},
-                         {"tick_instructions", nullptr}};
-      if (before.is_number() && after.is_number()) {
-        const auto n = after.get<std::uint64_t>() - before.get<std::uint64_t>();
-        out["tick_instructions"] = static_cast<double>(n) / a.ticks;
-      }
-      return out;
-    });
+    return out;
   });
 }
 
@@ -105,7 +132,7 @@ nlohmann::json bench_wake(const Arguments& a) {
   constexpr std::int64_t kPeriod_ns = 5'000'000;
   const int turn = std::min(a.wakes, 40);
   runtime::HeartbeatPage page{};
-  runtime::Supervisor supervisor({}, &page, 0);
+  runtime::Supervisor supervisor({&page, 0, nullptr, false});
   std::vector<std::int64_t> ours;
   std::vector<std::int64_t> bare;
   for (auto* late : {&ours, &bare}) late->reserve(2 * static_cast<std::size_t>(a.wakes));

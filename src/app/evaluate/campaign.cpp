@@ -1,4 +1,4 @@
-// `equipoise campaign`: every fault in every phase of flight, and the soak; docs/reliability.md from it.
+// `equipoise campaign`: every fault in every phase of a run, and the soak; docs/reliability.md from it.
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -6,7 +6,7 @@
 
 #include "app/cli/commands.hpp"
 #include "app/cli/reasons.hpp"
-#include "app/evaluate/fault_flight.hpp"
+#include "app/evaluate/fault_run.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -26,14 +26,16 @@ struct Soak {
   std::int64_t disarmed = 0;
   std::int64_t unexplained = 0;
   std::int64_t unsafe = 0;
-  nlohmann::json to_explain = nlohmann::json::array();  // flights that are unsafe or fell without a fault
+  nlohmann::json to_explain = nlohmann::json::array();  // runs that are unsafe or ended without a fault
 };
 
 template <class Firmware>
-Verdict one(const typename Firmware::Config& config, const FlightPlan& plan, std::uint64_t seed) {
+FaultOutcome one(const typename Firmware::Config& config, const FaultPlan& plan, std::uint64_t seed) {
   auto world = Firmware::world(config, fidelity_level("nominal"), seed);
-  return Firmware::with_pipeline(config, Firmware::kDefaultController,
-                                 [&](auto& pipeline) { return fly_with_fault(world, pipeline, plan, seed); });
+  return Firmware::with_pipeline(config, Firmware::kDefaultController, [&](auto& pipeline) {
+    const auto unrecorded = [](const auto&...) {};
+    return run_with_fault(world, pipeline, plan, seed, unrecorded);
+  });
 }
 
 int fault_tick(Phase phase) {
@@ -47,7 +49,7 @@ int fault_tick(Phase phase) {
   }
 }
 
-/// Flights with a random fault each, of random kind, time and length; between faults nothing may happen.
+/// Runs with a random fault each, of random kind, time and length; between faults nothing may happen.
 template <class Firmware>
 Soak soak(const typename Firmware::Config& config, double hours, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
@@ -58,25 +60,25 @@ Soak soak(const typename Firmware::Config& config, double hours, std::uint64_t s
   std::int64_t ticks = 0;
   const auto wanted = static_cast<std::int64_t>(hours * 3600.0 * kTickHz);
   while (ticks < wanted) {
-    FlightPlan plan;
+    FaultPlan plan;
     plan.phase = static_cast<Phase>(pick(2, static_cast<int>(Phase::kCount) - 1));
     plan.fault = static_cast<FaultKind>(pick(0, static_cast<int>(FaultKind::kCount) - 1));
     plan.fault_at_tick = pick(300, 3000);
     plan.fault_ticks = pick(1, 200);
     plan.end_tick = plan.fault_at_tick + pick(200, 2000);
-    const std::uint64_t flight_seed = engine();
-    const Verdict v = one<Firmware>(config, plan, flight_seed);
+    const std::uint64_t run_seed = engine();
+    const FaultOutcome v = one<Firmware>(config, plan, run_seed);
     ticks += plan.end_tick;
     ++s.flights;
     s.disarmed += v.disarmed ? 1 : 0;
     s.unsafe += v.unsafe ? 1 : 0;
-    s.unexplained += v.fell_without_fault ? 1 : 0;
-    if (v.unsafe || v.fell_without_fault) {
+    s.unexplained += v.off_without_fault ? 1 : 0;
+    if (v.unsafe || v.off_without_fault) {
       s.to_explain.push_back({{"phase", kPhaseNames[static_cast<std::size_t>(plan.phase)]},
                               {"fault", kFaults[static_cast<std::size_t>(plan.fault)].name},
                               {"fault_at_tick", plan.fault_at_tick},
                               {"fault_ticks", plan.fault_ticks},
-                              {"seed", flight_seed},
+                              {"seed", run_seed},
                               {"off_after_ticks", v.off_after_ticks},
                               {"reasons", reasons_text(v.reasons)},
                               {"why", v.why}});
@@ -104,11 +106,11 @@ int campaign(const Arguments& a) {
     for (std::size_t p = 0; p < kPhaseNames.size(); ++p) {
       std::string cell;
       for (int i = 0; i < a.seeds; ++i) {
-        FlightPlan plan;
+        FaultPlan plan;
         plan.phase = static_cast<Phase>(p);
         plan.fault = static_cast<FaultKind>(f);
         plan.fault_at_tick = fault_tick(plan.phase);
-        const Verdict v = one<Firmware>(config, plan, a.seed + static_cast<std::uint64_t>(i));
+        const FaultOutcome v = one<Firmware>(config, plan, a.seed + static_cast<std::uint64_t>(i));
         unsafe += v.unsafe ? 1 : 0;
         cases.push_back(
             {{"fault", kFaults[f].name},
@@ -162,12 +164,12 @@ int campaign(const Arguments& a) {
 
 void add_campaign(Subcommand app) {
   const Subcommand command =
-      app.subcommand("campaign", "break every part in every phase of flight, in simulated time");
+      app.subcommand("campaign", "break every part in every phase of a run, in simulated time");
   auto a = std::make_shared<Arguments>();
   command.option("--config", a->config, "robot configuration").required();
-  command.option("--seeds", a->seeds, "flights per case").show_default().range(1, 1000);
+  command.option("--seeds", a->seeds, "runs per case").show_default().range(1, 1000);
   command.option("--seed", a->seed, "the first").show_default();
-  command.option("--soak-hours", a->soak_h, "then random flights, hours of robot time")
+  command.option("--soak-hours", a->soak_h, "then random runs, hours of robot time")
       .show_default()
       .range(0.0, 10000.0);
   command.option("--markdown", a->markdown, "table for docs/reliability.md");

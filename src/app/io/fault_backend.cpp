@@ -19,6 +19,7 @@ int FaultBackend::wait_tick(void* p, std::int64_t* now_ns) {
   int status = rio_wait_tick(&b.inner_, now_ns);
   if (b.left_ > 0 && b.age_ > 0) --b.left_;
   ++b.age_;
+  b.log_failed_ = b.is(FaultKind::kLogFull);
   if (status == 0 && b.first(FaultKind::kStall20ms)) status = b.stall(4, now_ns);
   if (status == 0 && b.first(FaultKind::kStall50ms)) status = b.stall(10, now_ns);
   if (status == 0 && b.first(FaultKind::kStall1ms)) *now_ns += 1'000'000;

@@ -1,9 +1,11 @@
 // A hardware boundary that breaks on purpose: wraps any backend and spoils what passes through, from a given
-// tick on. In: backend, fault, first tick and how many -> out: another backend. While the loop is stalled it
-// plays the guard's part too: after three silent ticks the motors go off. Simulation and tests only.
+// tick on. In: backend, fault, first tick and how many -> out: another backend, and what of the fault lies
+// outside the boundary: a log that fails, a remote that is silent. While the loop is stalled it plays the
+// guard's part too: after three silent ticks the motors go off. Simulation and tests only.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <random>
 
@@ -88,6 +90,8 @@ class FaultBackend {
   }
   bool active() const { return left_ > 0; }
   FaultKind kind() const { return kind_; }
+  const std::atomic<bool>& log_failed() const { return log_failed_; }
+  bool remote_silent() const { return is(FaultKind::kRemoteLost); }
 
   rio_t io() {
     static const rio_ops_t ops{wait_tick, read_sensors, write_motors, motors_off, close};
@@ -114,6 +118,7 @@ class FaultBackend {
   static void close(void* p) { rio_close(&self(p).inner_); }
 
   rio_t inner_;
+  std::atomic<bool> log_failed_{false};
   std::mt19937_64 engine_;
   FaultKind kind_ = FaultKind::kImuOff;
   int left_ = 0;

@@ -1,6 +1,6 @@
 // The service manager's watchdog (systemd, sd_notify protocol): says "ready" at the first tick, then "alive"
 // as long as ticks come. In: tick numbers -> out: datagrams to $NOTIFY_SOCKET from a thread of its own;
-// without the variable, nothing. tick() is RT-safe: one atomic store.
+// without the variable, nothing. note() is RT-safe: one atomic store.
 #pragma once
 
 #include <atomic>
@@ -20,7 +20,7 @@ class ServiceNotify {
   ServiceNotify(const ServiceNotify&) = delete;
   ServiceNotify& operator=(const ServiceNotify&) = delete;
 
-  void tick(std::int64_t tick) noexcept { tick_.store(tick, std::memory_order_relaxed); }
+  void note(std::int64_t tick) noexcept { tick_.store(tick, std::memory_order_relaxed); }
 
  private:
   void beat();

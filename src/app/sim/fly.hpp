@@ -7,6 +7,7 @@
 #include "app/io/plant_backend.hpp"
 #include "app/sim/simulate.hpp"
 #include "equipoise/runtime/loop.hpp"
+#include "equipoise/runtime/supervisor.hpp"
 
 namespace equipoise::app {
 
@@ -22,15 +23,16 @@ inline Command script(const SimOptions& o, double t) {
 }
 
 template <class World, class Pipeline>
-SimSummary fly(World& world, Pipeline& pipeline, const SimOptions& options, const TickObserver& observe,
-               const std::atomic<bool>& stop) {
+SimSummary fly(World& world, Pipeline& pipeline, double rolling_radius_m, const SimOptions& options,
+               const TickObserver& observe, const std::atomic<bool>& stop) {
   PlantBackend<World> backend(world);
   Hardware hardware(backend.io());
   auto& estimators = pipeline.estimators();
   using Estimators = std::decay_t<decltype(estimators)>;
   const auto& robot = pipeline.params().robot;
 
-  RunMeter meter(Estimators::kCount);
+  RunMeter meter(Estimators::kCount, rolling_radius_m);
+  VerdictJudge judge;
   std::atomic<bool> done{false};
   const auto end_tick = static_cast<std::int64_t>(std::llround(options.duration_s * kTickHz));
   runtime::TickRecord record{};
@@ -45,16 +47,21 @@ SimSummary fly(World& world, Pipeline& pipeline, const SimOptions& options, cons
     const auto truth = world.truth();
     const StateView truth_view = view(truth, robot);
     const double time_s = world.time_s();
+    const StateView seen = view(t.x_hat, robot);
     meter.motors(t.motors, t.saturated);
+    meter.heading(seen, truth_view);
     if (RunMeter::settled(time_s)) {
-      meter.controlling(errors(t.x_hat, truth, robot));
+      const StateErrors e = errors(t.x_hat, truth, robot);
+      meter.controlling(e);
+      meter.rolling(seen, truth_view, e.axes);
       for (std::size_t i = 0; i < Estimators::kCount; ++i) {
         const auto id = static_cast<typename Estimators::Id>(i);
         if (estimators.runs(id)) meter.compared(i, errors(estimators.estimate(id), truth, robot));
       }
       meter.path(time_s, view(t.ref, robot), truth_view);
     }
-    if (!meter.upright(time_s, t.arm_state, t.reasons, truth_view)) done = true;
+    judge.observe({time_s, command.arm, t.motors.enable, t.reasons, truth_view.theta_rad.head<2>().norm()});
+    if (judge.lost() || judge.refused()) done = true;
     if (records) {
       record_tick(tick, now_ns, raw, command, t, pipeline, &record);
       record.truth = runtime::to_record(truth_view);
@@ -65,11 +72,11 @@ SimSummary fly(World& world, Pipeline& pipeline, const SimOptions& options, cons
   };
 
   const auto start = std::chrono::steady_clock::now();
-  const runtime::LoopEnd end = runtime::run_loop(hardware, pipeline, commands, on_tick, done);
+  runtime::Supervisor supervisor({nullptr, 0, options.log_failed, true});
+  const runtime::LoopEnd end = runtime::run_loop(hardware, pipeline, commands, on_tick, done, supervisor);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-  SimSummary summary = meter.summary(end.ticks, wall_s);
-  summary.interrupted = stop.load();
+  SimSummary summary = meter.summary(judge.verdict(stop.load(), false), end.ticks, wall_s);
   for (std::size_t i = 0; i < Estimators::kCount; ++i) {
     if (estimators.runs(static_cast<typename Estimators::Id>(i))) {
       summary.estimators[Estimators::kNames[i]] = meter.compared_errors(i);
@@ -84,7 +91,7 @@ SimSummary simulate(const typename Firmware::Config& configured, const Choice& c
   const typename Firmware::Config config = Firmware::apply(configured, choice);
   typename Firmware::World world = Firmware::world(config, fidelity_level(choice.fidelity), options.seed);
   return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    return fly(world, pipeline, options, observe, stop);
+    return fly(world, pipeline, Firmware::rolling_radius_m(config), options, observe, stop);
   });
 }
 

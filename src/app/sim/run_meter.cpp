@@ -4,14 +4,9 @@
 #include <cmath>
 
 namespace equipoise::app {
-namespace {
-
-constexpr double kFallenTilt_rad = 0.6;
-
-}  // namespace
 
 double RunMeter::Rms::value() const {
-  return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : 0.0;
+  return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : kUncounted;
 }
 
 void RunMeter::motors(const MotorCommand& motors, bool saturated) {
@@ -31,21 +26,21 @@ void RunMeter::path(double time_s, const StateView& reference, const StateView& 
   yaw_to_ = truth.theta_rad.z();
 }
 
-bool RunMeter::upright(double time_s, ArmState arm, std::uint32_t reasons, const StateView& truth) {
-  const bool lost = time_s > kArmAt_s + 0.1 && arm != ArmState::kArmed;
-  if (!lost && truth.theta_rad.head<2>().norm() <= kFallenTilt_rad) return true;
-  fell_at_s_ = time_s;
-  reasons_ = reasons;
-  return false;
+void RunMeter::rolling(const StateView& estimate, const StateView& truth, int axes) {
+  rolling_.add((estimate.phi_dot_rad_s - truth.phi_dot_rad_s).squaredNorm(), axes);
 }
 
-SimSummary RunMeter::summary(std::int64_t ticks, double wall_s) const {
+void RunMeter::heading(const StateView& estimate, const StateView& truth) {
+  heading_error_ = estimate.theta_rad.z() - truth.theta_rad.z();
+}
+
+SimSummary RunMeter::summary(const Verdict& verdict, std::int64_t ticks, double wall_s) const {
   SimSummary s;
-  s.fell = fell_at_s_ >= 0.0;
-  s.fell_at_s = fell_at_s_;
-  s.reasons = reasons_;
+  s.verdict = verdict;
   s.controlling = controlling_.value();
   s.position_rmse_m = position_.value();
+  s.yaw_frame_speed_rmse_m_s = rolling_radius_m_ * rolling_.value();
+  s.heading_error_rad = heading_error_;
   s.duty_max = duty_max_;
   s.saturated_fraction = driven_ > 0 ? static_cast<double>(saturated_) / static_cast<double>(driven_) : 0.0;
   if (yaw_to_s_ > yaw_from_s_ && yaw_from_s_ >= 0.0) {

@@ -1,13 +1,14 @@
 // The figures of one simulated run, for any robot.
 // In: every tick's estimates, truth, reference and motors -> out: SimSummary. Errors are against the plant's
-// truth and count from kSettled_s on. Simulation only.
+// truth and count from kSettled_s on; what was never counted is NaN. Simulation only.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "equipoise/actuate/safety.hpp"
+#include "app/run/verdict.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise::app {
@@ -18,40 +19,42 @@ inline constexpr double kDriveFrom_s = 1.0;
 /// Errors count from here on.
 inline constexpr double kSettled_s = 5.0;
 
+inline constexpr double kUncounted = std::numeric_limits<double>::quiet_NaN();
+
 struct EstimatorErrors {
-  double attitude_rmse_rad = 0.0;
-  double speed_rmse = 0.0;  // m/s of the ball, or rad/s of the wheels
+  double attitude_rmse_rad = kUncounted;
+  double speed_rmse = kUncounted;  // m/s of the ball, or rad/s of the wheels
 };
 
 struct SimSummary {
-  bool fell = false;
-  double fell_at_s = -1.0;
+  Verdict verdict;
   EstimatorErrors controlling;
-  double position_rmse_m = 0.0;
-  double yaw_rate_mean_hz = 0.0;
+  double yaw_frame_speed_rmse_m_s = kUncounted;  // of rolling, without what a wrong heading adds
+  double heading_error_rad = kUncounted;         // estimate minus truth, at the end
+  double position_rmse_m = kUncounted;
+  double yaw_rate_mean_hz = kUncounted;
   double duty_max = 0.0;
   double saturated_fraction = 0.0;
   std::int64_t ticks = 0;
   double real_time_factor = 0.0;
-  std::uint32_t reasons = 0;  // why the motors went off, if they did
-  bool interrupted = false;
   std::map<std::string, EstimatorErrors> estimators;
 };
 
 class RunMeter {
  public:
-  explicit RunMeter(std::size_t estimators) : compared_(estimators) {}
+  RunMeter(std::size_t estimators, double rolling_radius_m)
+      : compared_(estimators), rolling_radius_m_(rolling_radius_m) {}
 
   static bool settled(double time_s) noexcept { return time_s >= kSettled_s; }
   void motors(const MotorCommand& motors, bool saturated);
   void controlling(const StateErrors& e) { controlling_.add(e); }
   void compared(std::size_t i, const StateErrors& e) { compared_[i].add(e); }
   void path(double time_s, const StateView& reference, const StateView& truth);
+  /// The controlling estimate in its own yaw frame.
+  void rolling(const StateView& estimate, const StateView& truth, int axes);
+  void heading(const StateView& estimate, const StateView& truth);
 
-  /// False once the robot has fallen, or its motors went off.
-  bool upright(double time_s, ArmState arm, std::uint32_t reasons, const StateView& truth);
-
-  SimSummary summary(std::int64_t ticks, double wall_s) const;
+  SimSummary summary(const Verdict& verdict, std::int64_t ticks, double wall_s) const;
   EstimatorErrors compared_errors(std::size_t i) const { return compared_[i].value(); }
 
  private:
@@ -81,7 +84,10 @@ class RunMeter {
 
   Errors controlling_;
   std::vector<Errors> compared_;
+  double rolling_radius_m_;
   Rms position_;
+  Rms rolling_;
+  double heading_error_ = kUncounted;
   double yaw_from_ = 0.0;
   double yaw_from_s_ = -1.0;
   double yaw_to_ = 0.0;
@@ -89,8 +95,6 @@ class RunMeter {
   double duty_max_ = 0.0;
   std::int64_t saturated_ = 0;
   std::int64_t driven_ = 0;
-  double fell_at_s_ = -1.0;
-  std::uint32_t reasons_ = 0;
 };
 
 }  // namespace equipoise::app

@@ -1,11 +1,12 @@
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <thread>
 
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
+#include "app/log/log_name.hpp"
 #include "app/sim/simulate.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 
@@ -31,56 +32,64 @@ nlohmann::json to_json(const Arguments& a, const SimSummary& s, const std::strin
     estimators[name] = {{"attitude_rmse_rad", errors.attitude_rmse_rad},
                         {Firmware::kSpeedRmseKey, errors.speed_rmse}};
   }
-  return {{"robot", Firmware::kName},
-          {"seed", a.options.seed},
-          {"estimator", a.choice.estimator},
-          {"controller", a.choice.controller},
-          {"fidelity", a.choice.fidelity},
-          {"attitude", a.choice.attitude},
-          {"yaw_hz", a.options.yaw_rate_rad_s / (2.0 * kPi)},
-          {"drive_mps", a.options.drive_mps},
-          {"duration_s", static_cast<double>(s.ticks) * kTickS},
-          {"fell", s.fell},
-          {"fell_at_s", s.fell ? nlohmann::json(s.fell_at_s) : nlohmann::json(nullptr)},
-          {"attitude_rmse_rad", s.controlling.attitude_rmse_rad},
-          {Firmware::kSpeedRmseKey, s.controlling.speed_rmse},
-          {"position_rmse_m", s.position_rmse_m},
-          {"yaw_rate_mean_hz", s.yaw_rate_mean_hz},
-          {"duty_max", s.duty_max},
-          {"saturated_fraction", s.saturated_fraction},
-          {"ticks", s.ticks},
-          {"real_time_factor", s.real_time_factor},
-          {"interrupted", s.interrupted},
-          {"log", a.log},
-          {"estimators", estimators},
-          {"config_sha256", config_sha256},
-          {"version", version()}};
+  nlohmann::json out{{"robot", Firmware::kName},
+                     {"seed", a.options.seed},
+                     {"estimator", a.choice.estimator},
+                     {"controller", a.choice.controller},
+                     {"fidelity", a.choice.fidelity},
+                     {"attitude", a.choice.attitude},
+                     {"yaw_hz", a.options.yaw_rate_rad_s / (2.0 * kPi)},
+                     {"drive_mps", a.options.drive_mps},
+                     {"duration_s", static_cast<double>(s.ticks) * kTickS},
+                     {"attitude_rmse_rad", s.controlling.attitude_rmse_rad},
+                     {Firmware::kSpeedRmseKey, s.controlling.speed_rmse},
+                     {"yaw_frame_speed_rmse_m_s", s.yaw_frame_speed_rmse_m_s},
+                     {"heading_error_rad", s.heading_error_rad},
+                     {"position_rmse_m", s.position_rmse_m},
+                     {"yaw_rate_mean_hz", s.yaw_rate_mean_hz},
+                     {"duty_max", s.duty_max},
+                     {"saturated_fraction", s.saturated_fraction},
+                     {"ticks", s.ticks},
+                     {"real_time_factor", s.real_time_factor},
+                     {"interrupted", s.verdict.ended == Ended::kInterrupted},
+                     {"degraded", nlohmann::json::array()},
+                     {"log", a.log},
+                     {"estimators", estimators},
+                     {"config_sha256", config_sha256},
+                     {"version", version()}};
+  s.verdict.write(&out);
+  return out;  // NaN, never counted, is written as null
+}
+
+/// A number, or a dash where nothing was counted.
+std::string shown(const char* format, double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, format, value);
+  return std::isnan(value) ? "       -" : text;
 }
 
 template <class Firmware>
 void print_summary(std::FILE* out, const Arguments& a, const SimSummary& s) {
-  const double seconds = static_cast<double>(s.ticks) * kTickS;
-  if (s.fell) {
-    std::fprintf(out, "FELL after %.2f s", s.fell_at_s);
-  } else {
-    std::fprintf(out, "%s after %.1f s", s.interrupted ? "Interrupted, upright" : "Upright", seconds);
-  }
-  std::fprintf(out, "  (%s, %s, %s, %s, seed %llu)\n", Firmware::kName, a.choice.estimator.c_str(),
-               a.choice.controller.c_str(), a.choice.fidelity.c_str(),
+  std::fprintf(out, "%s  (%s, %s, %s, %s, seed %llu)\n", s.verdict.sentence().c_str(), Firmware::kName,
+               a.choice.estimator.c_str(), a.choice.controller.c_str(), a.choice.fidelity.c_str(),
                static_cast<unsigned long long>(a.options.seed));
-  std::fprintf(out, "  yaw rate        %8.3f Hz\n", s.yaw_rate_mean_hz);
-  std::fprintf(out, "  attitude RMSE   %8.4f rad\n", s.controlling.attitude_rmse_rad);
-  std::fprintf(out, "  %s %7.2f %s\n", Firmware::kSpeedLabel,
-               Firmware::kSpeedScale * s.controlling.speed_rmse, Firmware::kSpeedUnit);
-  std::fprintf(out, "  position RMSE   %8.3f m\n", s.position_rmse_m);
+  const auto line = [out](const char* label, const std::string& value, const char* unit) {
+    std::fprintf(out, "  %-15s %s %s\n", label, value.c_str(), unit);
+  };
+  line("yaw rate", shown("%8.3f", s.yaw_rate_mean_hz), "Hz");
+  line("attitude RMSE", shown("%8.4f", s.controlling.attitude_rmse_rad), "rad");
+  line(Firmware::kSpeedLabel, shown("%7.2f", Firmware::kSpeedScale * s.controlling.speed_rmse),
+       Firmware::kSpeedUnit);
+  line("position RMSE", shown("%8.3f", s.position_rmse_m), "m");
+  line("heading error", shown("%8.3f", s.heading_error_rad), "rad, at the end");
   std::fprintf(out, "  duty max        %8.3f, saturated %.2f %% of the time\n", s.duty_max,
                100.0 * s.saturated_fraction);
   std::fprintf(out, "  simulated at    %8.0f x real time\n", s.real_time_factor);
   if (s.estimators.size() > 1) {
     std::fprintf(out, "  %-18s %14s %12s, %s\n", "estimator", "attitude, rad", "speed", Firmware::kSpeedUnit);
     for (const auto& [name, e] : s.estimators) {
-      std::fprintf(out, "  %-18s %14.4f %18.2f\n", name.c_str(), e.attitude_rmse_rad,
-                   Firmware::kSpeedScale * e.speed_rmse);
+      std::fprintf(out, "  %-18s %14s %18s\n", name.c_str(), shown("%.4f", e.attitude_rmse_rad).c_str(),
+                   shown("%.2f", Firmware::kSpeedScale * e.speed_rmse).c_str());
     }
   }
 }
@@ -91,7 +100,7 @@ class Pace {
   Pace(bool realtime, double duration_s, std::FILE* out)
       : realtime_(realtime), duration_s_(duration_s), out_(isatty(fileno(out)) != 0 ? out : nullptr) {}
 
-  void tick(const runtime::TickRecord& r) {
+  void show(const runtime::TickRecord& r) {
     const double t = static_cast<double>(r.now_ns) * 1e-9;
     if (realtime_)
       std::this_thread::sleep_until(
@@ -115,17 +124,11 @@ class Pace {
   double next_line_s_ = 0.0;
 };
 
-std::string default_log(const Arguments& a) {
-  std::filesystem::create_directories("logs");
-  return "logs/sim-" + a.choice.estimator + "-" + a.choice.fidelity + "-seed" +
-         std::to_string(a.options.seed) + ".lcm";
-}
-
 template <class Firmware>
 int run(Arguments a) {
   complete<Firmware>(a.choice);
   const typename Firmware::Loaded loaded = Firmware::load(a.config, a.set);
-  if (a.log.empty()) a.log = default_log(a);
+  if (a.log.empty()) a.log = new_log_name("sim", Firmware::kName);
 
   runtime::TelemetryOptions telemetry_options;
   telemetry_options.log_path = a.log == "off" ? "" : a.log;
@@ -140,12 +143,12 @@ int run(Arguments a) {
   watch_interrupts();
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   Pace pace(a.realtime, a.options.duration_s, stderr);
+  a.options.log_failed = &telemetry.log_failed();
   const SimSummary summary = simulate<Firmware>(
       loaded.config, a.choice, a.options,
       [&](const runtime::TickRecord& record) {
         telemetry.hand_over(record);
-        if (telemetry.log_failed()) interrupted.store(true);  // nothing flies unrecorded
-        pace.tick(record);
+        pace.show(record);
       },
       interrupted);
   pace.end();
@@ -159,7 +162,7 @@ int run(Arguments a) {
     std::fprintf(stderr, "equipoise: %s\n", report.log_error.c_str());
     return 1;
   }
-  return summary.fell ? 1 : 0;
+  return summary.verdict.fell() ? 1 : 0;
 }
 
 int run(const Arguments& a) {
@@ -195,7 +198,7 @@ void add_sim(Subcommand app) {
       .one_of({"dmp", "own"});
   command.option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");
-  command.option("--log", a->log, "LCM event log, or off (default: logs/sim-...)");
+  command.option("--log", a->log, "LCM event log, or off (default: logs/sim-ROBOT-TIME.lcm)");
   command.option("--json", a->json, "summary as JSON, - for stdout");
   command.flag("--realtime", a->realtime, "pace to wall-clock time");
   command.option("--telemetry", a->telemetry, "LCM provider URL, or off").show_default();

@@ -16,6 +16,7 @@ struct SimOptions {
   double drive_mps = 0.0;
   double duration_s = 30.0;
   std::uint64_t seed = 1;
+  const std::atomic<bool>* log_failed = nullptr;  // then the motors stop: nothing runs unrecorded
 };
 
 using TickObserver = std::function<void(const runtime::TickRecord&)>;

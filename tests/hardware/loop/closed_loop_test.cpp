@@ -64,7 +64,7 @@ class ClosedLoop : public ::testing::Test {
     child_ = fork();
     if (child_ == 0) {
       execl(program.c_str(), "equipoise", "run", "--config", kConfig, "--board", kBoard, "--arm",
-            "--telemetry", "off", "--log", kLog, nullptr);
+            "--without-calibration", "--telemetry", "off", "--log", kLog, nullptr);
       _exit(127);
     }
   }

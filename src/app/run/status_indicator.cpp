@@ -1,4 +1,4 @@
-#include "app/run/announcer.hpp"
+#include "app/run/status_indicator.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -18,7 +18,7 @@ bool open_led(led_t* led, const BoardLine& line, const char* name) {
 
 }  // namespace
 
-Announcer::Announcer(const Board& board) {
+StatusIndicator::StatusIndicator(const Board& board) {
   has_green_ = open_led(&green_, board.led_green, "green");
   has_red_ = open_led(&red_, board.led_red, "red");
   if (!board.can_interface.empty()) {
@@ -31,7 +31,7 @@ Announcer::Announcer(const Board& board) {
   thread_ = std::thread([this] { run(); });
 }
 
-Announcer::~Announcer() {
+StatusIndicator::~StatusIndicator() {
   stop_.store(true);
   thread_.join();
   if (has_green_) led_close(&green_);
@@ -39,12 +39,12 @@ Announcer::~Announcer() {
   if (has_can_) can_close(&can_);
 }
 
-Announcer::Lights Announcer::lights(ArmState state, std::uint32_t reasons, bool odd) noexcept {
+StatusIndicator::Lights StatusIndicator::lights(ArmState state, std::uint32_t reasons, bool odd) noexcept {
   const bool ready = (reasons & ~std::uint32_t{kNotRequested}) == 0;
   return {state == ArmState::kArmed || (ready && odd), state != ArmState::kArmed && !ready};
 }
 
-can_frame Announcer::frame(std::uint64_t status) noexcept {
+can_frame StatusIndicator::frame(std::uint64_t status) noexcept {
   can_frame frame{};
   frame.can_id = kStatusId;
   frame.can_dlc = CAN_MAX_DLEN;
@@ -54,7 +54,7 @@ can_frame Announcer::frame(std::uint64_t status) noexcept {
   return frame;
 }
 
-void Announcer::run() {
+void StatusIndicator::run() {
   constexpr auto kTurn = std::chrono::milliseconds(100);
   constexpr unsigned kTurnsPerBlink = 5;
   for (unsigned turn = 0; !stop_.load(); ++turn) {

@@ -2,7 +2,7 @@
 // tick -> out: green LED: steady while armed, blinking while only asked-for is missing; red LED: another
 // reason forbids; CAN frame 0x1E0 ten times a second: arm state, battery in 0.1 V, reasons (4 bytes, low
 // first), 2 bytes 0. From a thread of its own; tell() is RT-safe: one atomic store. What cannot be opened is
-// a warning, never a reason not to fly.
+// a warning, never a reason not to run.
 #pragma once
 
 #include <atomic>
@@ -17,14 +17,14 @@
 
 namespace equipoise::app {
 
-class Announcer {
+class StatusIndicator {
  public:
   static constexpr std::uint32_t kStatusId = 0x1E0;
 
-  explicit Announcer(const Board& board);
-  ~Announcer();  // LEDs dark
-  Announcer(const Announcer&) = delete;
-  Announcer& operator=(const Announcer&) = delete;
+  explicit StatusIndicator(const Board& board);
+  ~StatusIndicator();  // LEDs dark
+  StatusIndicator(const StatusIndicator&) = delete;
+  StatusIndicator& operator=(const StatusIndicator&) = delete;
 
   void tell(ArmState state, std::uint32_t reasons, double battery_V) noexcept {
     const double tenths = battery_V > 0.0 && battery_V < 25.5 ? 10.0 * battery_V : 0.0;

@@ -1,26 +1,26 @@
-#include "app/run/announcer.hpp"
+#include "app/run/status_indicator.hpp"
 
 #include <gtest/gtest.h>
 
 namespace equipoise::app {
 namespace {
 
-TEST(Announcer, LightsTellArmedReadyAndForbidden) {
+TEST(StatusIndicator, LightsTellArmedReadyAndForbidden) {
   for (const bool odd : {false, true}) {
-    const auto armed = Announcer::lights(ArmState::kArmed, 0, odd);
+    const auto armed = StatusIndicator::lights(ArmState::kArmed, 0, odd);
     EXPECT_TRUE(armed.green && !armed.red);
-    const auto ready = Announcer::lights(ArmState::kDisarmed, kNotRequested, odd);
+    const auto ready = StatusIndicator::lights(ArmState::kDisarmed, kNotRequested, odd);
     EXPECT_EQ(ready.green, odd);
     EXPECT_FALSE(ready.red);
-    const auto forbidden = Announcer::lights(ArmState::kDisarmed, kNotRequested | kBatteryLow, odd);
+    const auto forbidden = StatusIndicator::lights(ArmState::kDisarmed, kNotRequested | kBatteryLow, odd);
     EXPECT_TRUE(!forbidden.green && forbidden.red);
   }
 }
 
-TEST(Announcer, FrameHoldsEveryReason) {
+TEST(StatusIndicator, FrameHoldsEveryReason) {
   const std::uint32_t reasons = kWheelFour | kTilt | kNotRequested;
   const can_frame frame =
-      Announcer::frame(std::uint64_t{reasons} | std::uint64_t{2} << 32U | std::uint64_t{78} << 40U);
+      StatusIndicator::frame(std::uint64_t{reasons} | std::uint64_t{2} << 32U | std::uint64_t{78} << 40U);
   EXPECT_EQ(frame.can_id, 0x1E0U);
   EXPECT_EQ(frame.can_dlc, 8);
   EXPECT_EQ(frame.data[0], 2);

@@ -1,11 +1,13 @@
-// Any robot through pipeline and world, one tick at a time, so that a test can interfere with the sample
-// before the pipeline sees it. The same code for every robot: types come from its Firmware.
+// One trial of any robot through loop, pipeline and world, in which a test may spoil every sample before the
+// pipeline sees it. The same code for every robot: types come from its Firmware.
 #pragma once
 
 #include <string>
 
 #include "app/io/plant_backend.hpp"
 #include "app/run/firmware.hpp"
+#include "equipoise/runtime/loop.hpp"
+#include "support/stepped_io.hpp"
 
 namespace equipoise {
 
@@ -20,7 +22,7 @@ inline std::string config_file<app::MipFirmware>() {
   return std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml";
 }
 
-struct FlightEnd {
+struct TrialEnd {
   ArmState arm_state = ArmState::kDisarmed;
   std::uint32_t reasons = 0;
   double ended_at_s = 0.0;  // after arming; the motors' last tick
@@ -29,28 +31,29 @@ struct FlightEnd {
 /// Half a second at rest, then armed for `seconds` or until the motors go off. `interfere(RawSample&)`: every
 /// tick.
 template <class Firmware, class Interfere>
-FlightEnd fly_with(const app::Choice& choice, std::uint64_t seed, double seconds, Interfere&& interfere,
+TrialEnd run_trial(const app::Choice& choice, std::uint64_t seed, double seconds, Interfere&& interfere,
                    const std::vector<std::string>& set = {}) {
   const auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), set).config, choice);
   auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), seed);
+  app::PlantBackend backend(world);
+  app::Hardware hardware(backend.io());
   return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    FlightEnd end;
-    MotorCommand motors{};
-    constexpr int kRestTicks = 100;
-    for (int tick = 0; tick < kRestTicks + static_cast<int>(seconds * kTickHz); ++tick) {
-      world.advance(motors);
-      RawSample raw = world.sense();
-      interfere(raw);
+    constexpr std::int64_t kRestTicks = 100;
+    TrialEnd end;
+    std::atomic<bool> done{false};
+    const auto commands = [&](std::int64_t tick, std::int64_t) {
       pipeline.estimators().observe_truth(world.truth());
       Command command;
       command.arm = tick >= kRestTicks;
-      const auto t = pipeline.tick(raw, command);
-      motors = t.motors;
-      end.arm_state = t.arm_state;
-      end.reasons = t.reasons;
-      end.ended_at_s = (tick - kRestTicks) * kTickS;
-      if (tick > kRestTicks && !motors.enable) break;
-    }
+      return command;
+    };
+    const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&,
+                             const auto& t) {
+      end = {t.arm_state, t.reasons, static_cast<double>(tick - kRestTicks) * kTickS};
+      done = tick > kRestTicks && !t.motors.enable;
+    };
+    SteppedIo io(hardware, kRestTicks + static_cast<std::int64_t>(seconds * kTickHz), interfere);
+    (void)runtime::run_loop(io, pipeline, commands, on_tick, done);
     return end;
   });
 }

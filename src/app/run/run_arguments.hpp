@@ -1,0 +1,44 @@
+// What `equipoise run` is asked for, what comes of it, and how that is told. In: command line, outcome ->
+// out: JSON, text, exit status.
+#pragma once
+
+#include "app/run/realtime_session.hpp"
+#include "app/run/trial.hpp"
+
+namespace equipoise::app {
+
+struct RunArguments {
+  std::string config;
+  std::string backend = "board";
+  std::string board;
+  std::string socket;
+  Choice choice;
+  std::vector<std::string> set;
+  std::string log;
+  std::string json;
+  std::string telemetry = runtime::kDefaultTelemetryUrl;
+  double duration_s = 0.0;
+  double yaw_hz = 0.0;
+  double drive_mps = 0.0;
+  double timeout_s = 5.0;
+  std::int64_t log_max_mb = 200;      // half an hour
+  std::int64_t log_min_free_mb = 20;  // for others on the disk
+  bool arm = false;
+  std::string command_key;
+  std::string robot_name;
+  std::string command_url = runtime::kDefaultTelemetryUrl;
+  SessionOptions session;
+};
+
+struct Outcome {
+  Trial trial;
+  std::string end;    // finished, interrupted, fell, peer_gone, timeout, protocol, device, log
+  std::string error;  // one line; empty when nothing went wrong
+  std::string log;
+};
+
+/// Writes text and JSON; the exit status. `session`: guard, realtime, timing; null: an engine's time.
+int report(const RunArguments& a, const std::string& robot, Outcome outcome, int trials,
+           const std::string& config_sha256, const nlohmann::json& session);
+
+}  // namespace equipoise::app

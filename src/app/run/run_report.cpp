@@ -1,0 +1,53 @@
+#include <cstdio>
+
+#include "app/cli/reasons.hpp"
+#include "app/run/run_arguments.hpp"
+
+namespace equipoise::app {
+namespace {
+
+nlohmann::json to_json(const RunArguments& a, const std::string& robot, const Outcome& o, int trials,
+                       const std::string& sha256, const nlohmann::json& session) {
+  const Trial& t = o.trial;
+  nlohmann::json out{{"robot", robot},
+                     {"backend", a.backend},
+                     {"estimator", a.choice.estimator},
+                     {"controller", a.choice.controller},
+                     {"duration_s", t.duration_s()},
+                     {"ticks", t.ticks},
+                     {"armed", t.armed},
+                     {"duty_max", t.duty_max},
+                     {"saturated_fraction",
+                      t.driven > 0 ? static_cast<double>(t.saturated) / static_cast<double>(t.driven) : 0.0},
+                     {"flights", trials},
+                     {"end", o.end},
+                     {"error", o.error.empty() ? nlohmann::json(nullptr) : nlohmann::json(o.error)},
+                     {"log", o.log},
+                     {"config_sha256", sha256},
+                     {"version", version()}};
+  t.verdict.write(&out);
+  if (!session.is_null()) out.update(session);
+  return out;
+}
+
+}  // namespace
+
+int report(const RunArguments& a, const std::string& robot, Outcome o, int trials,
+           const std::string& config_sha256, const nlohmann::json& session) {
+  const Trial& t = o.trial;
+  if (o.error.empty() && t.verdict.fell() && t.armed)
+    o.error = "the motors went off at " + std::to_string(t.verdict.fell_at_s) +
+              " s: " + reasons_text(t.verdict.reasons);
+  if (o.error.empty() && a.arm && a.command_key.empty() && !t.armed && t.duration_s() > 0.6)
+    o.error = "the robot never armed: " + reasons_text(t.verdict.reasons);
+  std::FILE* const out = a.json == "-" ? stderr : stdout;
+  std::fprintf(out, "%s  (%s, %s, %s)\n", t.verdict.sentence().c_str(), a.backend.c_str(),
+               a.choice.estimator.c_str(), a.choice.controller.c_str());
+  std::fprintf(out, "  duty max        %8.3f\n  log             %s\n", t.duty_max, o.log.c_str());
+  if (!a.json.empty()) write_json(to_json(a, robot, o, trials, config_sha256, session), a.json);
+  if (o.error.empty()) return 0;
+  std::fprintf(stderr, "equipoise: %s; motors are off\n", o.error.c_str());
+  return 1;
+}
+
+}  // namespace equipoise::app

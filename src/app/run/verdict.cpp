@@ -1,0 +1,85 @@
+#include "app/run/verdict.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+#include "app/cli/reasons.hpp"
+
+namespace equipoise::app {
+namespace {
+
+constexpr double kPatience_s = 0.1;  // between the request and armed motors
+// The estimate, which safety judges by, passes the limit a little before or after the truth.
+constexpr double kSurelyFalling_rad = 0.9 * VerdictJudge::kFallenTilt_rad;
+
+bool falling(const VerdictJudge::Tick& tick) noexcept {
+  return (tick.reasons & kTilt) != 0 && !(tick.true_tilt_rad < kSurelyFalling_rad);
+}
+
+}  // namespace
+
+void VerdictJudge::lose(Ended how, const Tick& tick) noexcept {
+  verdict_.ended = how;
+  verdict_.reasons = tick.reasons;
+  verdict_.fell_at_s = tick.t_s;
+}
+
+void VerdictJudge::observe(const Tick& tick) noexcept {
+  verdict_.duration_s = tick.t_s;
+  if (lost_) return;
+  verdict_.reasons = tick.reasons;
+  armed_ = armed_ || tick.driven;
+  if (!tick.asked) asked_from_s_ = -1.0;
+  if (tick.asked && asked_from_s_ < 0.0) asked_from_s_ = tick.t_s;
+  const bool off = tick.asked && !tick.driven;
+  refused_ = off && !armed_ && tick.t_s > asked_from_s_ + kPatience_s;
+  lost_ = (off && armed_) || tick.true_tilt_rad > kFallenTilt_rad;
+  if (lost_)
+    lose(tick.true_tilt_rad > kFallenTilt_rad || falling(tick) ? Ended::kFell : Ended::kDisarmed, tick);
+}
+
+Verdict VerdictJudge::verdict(bool interrupted, bool device_failed) const noexcept {
+  Verdict out = verdict_;
+  if (lost_) return out;
+  if (device_failed) {
+    out.ended = Ended::kDevice;
+  } else if (refused_) {
+    out.ended = Ended::kDisarmed;
+    out.fell_at_s = out.duration_s;
+  } else if (interrupted) {
+    out.ended = Ended::kInterrupted;
+  }
+  return out;
+}
+
+std::string Verdict::sentence() const {
+  const std::string why = reasons == 0 ? "" : ": " + reasons_text(reasons);
+  char text[80];
+  switch (ended) {
+    case Ended::kFell:
+      std::snprintf(text, sizeof text, "Fell over at %.2f s", fell_at_s);
+      return text + why;
+    case Ended::kDisarmed:
+      std::snprintf(text, sizeof text, "The motors were off while asked for at %.2f s", fell_at_s);
+      return text + why;
+    case Ended::kInterrupted:
+      std::snprintf(text, sizeof text, "Interrupted after %.1f s", duration_s);
+      break;
+    case Ended::kDevice:
+      std::snprintf(text, sizeof text, "The device failed after %.1f s", duration_s);
+      break;
+    case Ended::kFinished:
+      std::snprintf(text, sizeof text, "Finished after %.1f s", duration_s);
+      break;
+  }
+  return text + (reasons == 0 ? ", upright" : ", motors off" + why);
+}
+
+void Verdict::write(nlohmann::json* out) const {
+  (*out)["ended"] = name();
+  (*out)["reasons"] = reason_names(reasons);
+  (*out)["fell"] = fell();
+  (*out)["fell_at_s"] = fell() ? nlohmann::json(fell_at_s) : nlohmann::json(nullptr);
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,91 @@
+// Runs in which the runtime intervened (overrun, failing write, old command, full log) replay bit for bit:
+// the log holds everything the tick saw.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "app/evaluate/fault_run.hpp"
+#include "app/log/replay.hpp"
+#include "equipoise/runtime/telemetry.hpp"
+#include "support/trial.hpp"
+
+namespace equipoise {
+namespace {
+
+using app::FaultKind;
+
+constexpr FaultKind kInterventions[] = {FaultKind::kStall20ms, FaultKind::kStall50ms, FaultKind::kWriteError,
+                                        FaultKind::kRemoteLost, FaultKind::kLogFull};
+constexpr std::uint64_t kSeeds = 8;  // 40 runs per robot
+
+struct Recorded {
+  std::uint32_t inhibit = 0;  // all bits that were raised
+  double oldest_command_s = 0.0;
+};
+
+template <class Firmware>
+Recorded record(const std::string& path, FaultKind fault, app::Phase phase, std::uint64_t seed) {
+  app::Choice choice;
+  choice.fidelity = "nominal";
+  app::complete<Firmware>(choice);
+  const auto loaded = Firmware::load(config_file<Firmware>(), {});
+  const auto config = Firmware::apply(loaded.config, choice);
+  runtime::TelemetryOptions options;
+  options.log_path = path;
+  options.wait_when_full = true;
+  options.run = app::run_info<Firmware>(loaded, choice, static_cast<std::int64_t>(seed));
+  options.run.backend = "sim";
+  runtime::Telemetry telemetry(options);
+  app::FaultPlan plan;
+  plan.phase = phase;
+  plan.fault = fault;
+  plan.fault_at_tick = phase == app::Phase::kArming ? 60 : 400 + 7 * static_cast<int>(seed);
+  plan.fault_ticks = 150;
+  plan.end_tick = 800;
+  auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), seed);
+  Recorded out;
+  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    runtime::TickRecord r{};
+    const auto keep = [&](std::int64_t tick, std::int64_t now_ns, const RawSample& raw,
+                          const Command& command, const auto& t) {
+      app::record_tick(tick, now_ns, raw, command, t, pipeline, &r);
+      telemetry.hand_over(r);
+      out.inhibit |= t.inhibit;
+      out.oldest_command_s = std::max(out.oldest_command_s, command.age_s);
+    };
+    (void)app::run_with_fault(world, pipeline, plan, seed, keep);
+  });
+  telemetry.finish();
+  return out;
+}
+
+template <class Firmware>
+class FaultReplay : public testing::Test {};
+using Robots = testing::Types<app::MbbrFirmware, app::MipFirmware>;
+TYPED_TEST_SUITE(FaultReplay, Robots);
+
+TYPED_TEST(FaultReplay, IsBitExactWhereTheRuntimeIntervened) {
+  const std::string path = testing::TempDir() + "fault-replay-" + TypeParam::kName + ".lcm";
+  for (const FaultKind fault : kInterventions) {
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      SCOPED_TRACE(std::string(app::kFaults[static_cast<std::size_t>(fault)].name) + " seed " +
+                   std::to_string(seed));
+      // Before arming, and in each phase after it.
+      const auto phase = static_cast<app::Phase>(1 + seed % 4);
+      const Recorded recorded = record<TypeParam>(path, fault, phase, seed);
+      if (fault == FaultKind::kRemoteLost) {
+        EXPECT_GT(recorded.oldest_command_s, 0.5);
+      } else {
+        EXPECT_NE(recorded.inhibit, 0U) << "the runtime did not intervene";
+      }
+      app::RunLog log(path);
+      const app::Replay replay = app::replay_log(log, path, "");
+      EXPECT_GE(replay.ticks, 780);
+      EXPECT_TRUE(replay.identical()) << "tick " << replay.difference.tick << " " << replay.difference.field;
+    }
+  }
+  std::filesystem::remove(path);
+}
+
+}  // namespace
+}  // namespace equipoise
