@@ -23,9 +23,17 @@ inline bool attitude_ok(const RawSample& raw) noexcept { return (raw.valid & RIO
 /// What the bridges get.
 using MotorCommand = rio_motors_t;
 
+template <std::size_t N>
+constexpr std::array<bool, N> all_true() noexcept {
+  std::array<bool, N> flags{};
+  for (bool& flag : flags) flag = true;
+  return flags;
+}
+
 /// The same sample in SI units and body axes. `Wheels`: the robot's motor count.
 template <int Wheels>
 struct Measurement {
+  using WheelFlags = std::array<bool, Wheels>;
   std::int64_t t_ns = 0;
   Vec3 gyro_B_rad_s = Vec3::Zero();
   Vec3 accel_B_m_s2 = Vec3::Zero();  // [T] (5.26): gravity minus acceleration; at rest z = -9.8
@@ -41,6 +49,8 @@ struct Measurement {
   bool encoder_jump = false;  // further than a wheel can turn in a tick
   bool bridge_fault = false;  // a bridge complains
   bool all_finite = true;     // of the raw sample
+  std::array<bool, 3> gyro_axis_ok{true, true, true};      // beside imu_ok: an axis that is known to be dead
+  std::array<bool, Wheels> wheel_ok = all_true<Wheels>();  // beside encoders_ok: a wheel that lies
 };
 
 /// What a person or a script asks for.

@@ -41,7 +41,7 @@ void read_filter(Section s, typename Filter::Params& params) {
   params.Q = s.vector<Filter::n>("q", 0.0, 1e6);
   params.R = s.vector<Filter::m>("r", 1e-15, 1e6);
   params.input_variance = s.vector<Filter::p>("input_variance", 0.0, 100.0);
-  params.initial_variance = s.number("initial_variance", 0.0, 1e3);
+  params.initial_variance.setConstant(s.number("initial_variance", 0.0, 1e3));
   s.finish();
 }
 

@@ -25,7 +25,7 @@ class KalmanFilter {
     Vec<n> Q = Vec<n>::Constant(1e-4);       // diagonal, per tick
     Vec<m> R = Vec<m>::Ones();               // diagonal
     Vec<p> input_variance = Vec<p>::Zero();  // of u, per tick: friction and motors that do not do as told
-    double initial_variance = 1e-4;
+    Vec<n> initial_variance = Vec<n>::Constant(1e-4);
   };
 
   KalmanFilter(const Model& model, const Params& params)
@@ -38,8 +38,9 @@ class KalmanFilter {
 
   void reset(const Vec<n>& x) noexcept {
     x_ = x;
-    P_ = Mat<n, n>::Identity() * params_.initial_variance;
+    P_ = params_.initial_variance.asDiagonal();
     normalized_innovation_ = 0.0;
+    row_nis_.fill(0.0);
   }
 
   void predict(const Vec<p>& u) noexcept {
@@ -59,7 +60,9 @@ class KalmanFilter {
     double nis = 0.0;
     int used = 0;
     for (int i = 0; i < m; ++i) {
-      if (!use[static_cast<std::size_t>(i)]) continue;
+      const auto row = static_cast<std::size_t>(i);
+      row_nis_[row] = 0.0;
+      if (!use[row]) continue;
       const Vec<n> h = H_.row(i).transpose();
       const Vec<n> Ph = P_ * h;
       const double s = h.dot(Ph) + params_.R(i);
@@ -71,16 +74,25 @@ class KalmanFilter {
       for (int j = 0; j < n; ++j) {
         P_.col(j) += (k * k(j)) * s - (k * Ph(j) + Ph * k(j));
       }
-      nis += innovation * innovation / s;
+      row_nis_[row] = innovation * innovation / s;
+      nis += row_nis_[row];
       ++used;
     }
     normalized_innovation_ = used > 0 ? nis / used : 0.0;
+  }
+
+  /// Adds to the variances of `count` states from `first` on.
+  void widen(int first, int count, double variance) noexcept {
+    P_.diagonal().segment(first, count).array() += variance;
   }
 
   const Vec<n>& x() const noexcept { return x_; }
   Vec<n>& x() noexcept { return x_; }
   const Mat<n, n>& P() const noexcept { return P_; }
   double normalized_innovation() const noexcept { return normalized_innovation_; }
+  /// Squared innovation over its variance, of each row; 0 where it was not used.
+  const std::array<double, m>& row_nis() const noexcept { return row_nis_; }
+  const Model& model() const noexcept { return model_; }
 
  private:
   Model model_;
@@ -92,6 +104,7 @@ class KalmanFilter {
   Mat<n, n> FP_;
   Mat<m, n> H_ = Mat<m, n>::Zero();
   double normalized_innovation_ = 0.0;
+  std::array<double, m> row_nis_{};
 };
 
 }  // namespace equipoise

@@ -82,6 +82,22 @@ MbbrThesisFeedbackParams read_thesis(Section s) {
   return p;
 }
 
+MbbrEkf::Params read_ekf(Section s) {
+  constexpr int n = MbbrEkfModel::kStates;
+  MbbrEkf::Params p;
+  p.filter.Q = s.vector<n>("q", 0.0, 1e6);
+  p.filter.R = s.vector<MbbrEkfModel::kOutputs>("r", 1e-15, 1e6);
+  p.filter.input_variance = s.vector<3>("input_variance", 0.0, 100.0);
+  p.filter.initial_variance = s.vector<n>("initial_sigma", 0.0, 30.0).cwiseAbs2();
+  p.disturbance_time_constant_s = s.number("disturbance_time_constant_s", kTickS, 1e6);
+  p.sensor_age_s = s.number("sensor_age_s", 0.0, TimeBase<3, 3>::kMaxAge_s);
+  p.push_nis = s.number("push_nis", 1.0, 1e9);
+  p.push_tilt_rate_variance = s.number("push_tilt_rate_variance", 0.0, 100.0);
+  p.push_ball_rate_variance = s.number("push_ball_rate_variance", 0.0, 1000.0);
+  s.finish();
+  return p;
+}
+
 void read_disturbance(Section& s, MbbrWorldParams* w) {
   w->coulomb_scale = s.number("coulomb_scale", 0.0, 10.0);
   w->extra_viscous_N_m_s = s.number("extra_viscous_N_m_s", 0.0, 1.0);
@@ -118,7 +134,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   friction.finish();
 
   Section estimator = root.table("estimator");
-  read_filter<KalmanFilter<MbbrModel10>>(estimator.table("ekf"), c.estimators.ekf);
+  c.estimators.ekf = read_ekf(estimator.table("ekf"));
   read_filter<KalmanFilter<MbbrModel13>>(estimator.table("ekf13"), c.estimators.ekf13);
   read_filter<KalmanFilter<MbbrPublishedModel>>(estimator.table("ekf13_published"),
                                                 c.estimators.ekf13_published);

@@ -17,7 +17,7 @@ double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * kPi);
 MbbrEstimators::MbbrEstimators(const Params& params)
     : params_(params),
       kinematics_(params.robot),
-      ekf_(MbbrModel10(params.robot), params.ekf),
+      ekf_(params.robot, params.ekf),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(MbbrLinearModel(params.robot, params.kf_yaw_transport), params.kf) {}
@@ -26,10 +26,7 @@ void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);
   const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
 
-  Vec<10> x10 = Vec<10>::Zero();
-  x10.head<2>() = tilt;
-  x10.segment<3>(MbbrModel10::kE) = phi_B + Vec3(tilt.x(), tilt.y(), 0.0);
-  ekf_.reset(x10);
+  ekf_.start(tilt, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
 
   Vec<13> x13 = Vec<13>::Zero();
   x13.head<2>() = tilt;
@@ -71,15 +68,9 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
   const std::array<bool, 8> use{i, i, i, e, e, e, i, i};
 
   if (runs(Id::kEkf)) {
-    step(ekf_, u, y, use);
-    const Vec<10>& x = ekf_.x();
-    MbbrEstimate& out = estimates_[index(Id::kEkf)];
-    integrate(Id::kEkf, x(MbbrModel10::kThetaDotZ));
-    out.theta_xy = x.head<2>();
-    out.theta_dot = x.segment<3>(MbbrModel10::kThetaDotX);
-    out.phi_dot_star = x.tail<2>();
-    out.omega_B = body_rates(out.theta_xy, out.theta_dot);
-    out.normalized_innovation = ekf_.normalized_innovation();
+    ekf_.predict(u);
+    ekf_.update(z);
+    estimates_[index(Id::kEkf)] = ekf_.estimate();
   }
 
   const auto from_13 = [this](Id id, const Vec<13>& x, double nis) {

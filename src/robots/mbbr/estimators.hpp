@@ -8,7 +8,9 @@
 #include <array>
 
 #include "equipoise/estimate/kalman.hpp"
+#include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "robots/mbbr/ekf.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/mbbr.hpp"
 #include "robots/mbbr/published.hpp"
@@ -22,7 +24,7 @@ inline constexpr std::array<const char*, 5> kMbbrEstimatorNames{"ekf", "ekf13_pu
 struct MbbrEstimatorParams {
   MbbrEstimatorId active = MbbrEstimatorId::kEkf;
   bool compare = false;  // run all of them, not only the active one
-  KalmanFilter<MbbrModel10>::Params ekf;
+  MbbrEkf::Params ekf;
   KalmanFilter<MbbrPublishedModel>::Params ekf13_published;
   KalmanFilter<MbbrModel13>::Params ekf13;
   KalmanFilter<MbbrLinearModel>::Params kf;
@@ -48,6 +50,8 @@ class MbbrEstimators {
 
   bool runs(Id id) const noexcept { return id == params_.active || params_.compare; }
   const MbbrEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
+  /// The default filter: rows, variances, predicted wheel rates.
+  const MbbrEkf& ekf() const noexcept { return ekf_; }
   bool needs_attitude() const noexcept { return params_.active == Id::kKfAttitude; }
 
  private:
@@ -57,11 +61,12 @@ class MbbrEstimators {
 
   Params params_;
   MbbrKinematics kinematics_;
-  KalmanFilter<MbbrModel10> ekf_;
+  MbbrEkf ekf_;
   KalmanFilter<MbbrPublishedModel> ekf13_published_;
   KalmanFilter<MbbrModel13> ekf13_;
   KalmanFilter<MbbrLinearModel> kf_;
   RestTilt rest_tilt_;
+  RestBias rest_bias_;
   std::array<MbbrEstimate, kCount> estimates_{};
   double attitude_heading_ = 0.0;  // continuous heading of the attitude source
 };

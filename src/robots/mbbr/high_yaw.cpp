@@ -1,5 +1,6 @@
 #include "robots/mbbr/high_yaw.hpp"
 
+#include "equipoise/estimate/midpoint.hpp"
 #include "robots/mbbr/published.hpp"
 
 namespace equipoise {
@@ -107,82 +108,66 @@ Mat<3, 7> slip_jacobian(const MbbrHighYaw::State& x) noexcept {
 
 }  // namespace
 
-void MbbrModel10::predict(const Vec<10>& x, const Vec3& u, Vec<10>& x_next, Mat<10, 10>& F) const noexcept {
-  MbbrHighYaw::State d;
-  d << x.head<2>(), x.tail<5>();
+void MbbrObservable::derivative(const MbbrCoefficients& c, const State& x, const Vec3& u, State& x_dot,
+                                Mat<10, 10>& A) noexcept {
+  const MbbrHighYaw::State d = dynamic(x);
   Vec<5> a;
   Mat<5, 7> J;
-  MbbrHighYaw::accelerations(c_, d, u, a, J);
+  MbbrHighYaw::accelerations(c, d, u, a, J);
+  x_dot << x.segment<2>(kThetaDotX), encoder_sums_rate(d), a;
 
-  x_next = x;
-  x_next.head<2>() += kTickS * x.segment<2>(kThetaDotX);
-  x_next.segment<3>(kE) += kTickS * encoder_sums_rate(d);
-  x_next.tail<5>() += kTickS * a;
-
-  F.setIdentity();
-  F(kThetaX, kThetaDotX) = kTickS;
-  F(kThetaY, kThetaDotY) = kTickS;
+  A.setZero();
+  A(kThetaX, kThetaDotX) = 1.0;
+  A(kThetaY, kThetaDotY) = 1.0;
   Mat<3, 7> E = slip_jacobian(d);
   E(0, MbbrHighYaw::kPhiDotX) += 1.0;
   E(1, MbbrHighYaw::kPhiDotY) += 1.0;
   E(2, MbbrHighYaw::kThetaDotZ) -= 1.0;
-  F.block<3, 2>(kE, 0) = kTickS * E.leftCols<2>();
-  F.block<3, 5>(kE, kThetaDotX) = kTickS * E.rightCols<5>();
-  F.block<5, 2>(kThetaDotX, 0) = kTickS * J.leftCols<2>();
-  F.block<5, 5>(kThetaDotX, kThetaDotX) += kTickS * J.rightCols<5>();
+  A.block<3, 2>(kE, 0) = E.leftCols<2>();
+  A.block<3, 5>(kE, kThetaDotX) = E.rightCols<5>();
+  A.block<5, 2>(kThetaDotX, 0) = J.leftCols<2>();
+  A.block<5, 5>(kThetaDotX, kThetaDotX) = J.rightCols<5>();
 }
 
-Mat<10, 3> MbbrModel10::input_matrix() const noexcept {
-  Mat<10, 3> B = Mat<10, 3>::Zero();
-  B.bottomRows<5>() = MbbrHighYaw::rate_input_matrix(c_);
-  return B;
-}
-
-void MbbrModel10::measure(const Vec<10>& x, const Vec3& u, Vec<8>& y, Mat<8, 10>& H) const noexcept {
-  MbbrHighYaw::State d;
-  d << x.head<2>(), x.tail<5>();
-  Vec<5> h;
-  Mat<5, 7> J;
-  MbbrHighYaw::inertial_rows(c_, d, u, h, J);
-  y << h.head<3>(), x(kE) - x(kThetaX), x(kE + 1) - x(kThetaY), x(kE + 2), h.tail<2>();
-  H.setZero();
-  H.topLeftCorner<3, 2>() = J.topLeftCorner<3, 2>();
-  H.block<3, 5>(0, kThetaDotX) = J.topRightCorner<3, 5>();
-  H.block<3, 3>(3, kE).setIdentity();
-  H(3, kThetaX) = -1.0;
-  H(4, kThetaY) = -1.0;
-  H.bottomLeftCorner<2, 2>() = J.bottomLeftCorner<2, 2>();
-  H.block<2, 5>(6, kThetaDotX) = J.bottomRightCorner<2, 5>();
+Vec3 MbbrObservable::encoder_rate_B(const State& x) noexcept {
+  return encoder_sums_rate(dynamic(x)) - Vec3(x(kThetaDotX), x(kThetaDotY), 0.0);
 }
 
 void MbbrModel13::predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_next, Mat<13, 13>& F) const noexcept {
   using M = MbbrPublishedModel;
-  MbbrHighYaw::State d;
-  d << x.head<2>(), x.segment<5>(M::kThetaDotX);
-  Vec<5> a;
-  Mat<5, 7> J;
-  MbbrHighYaw::accelerations(c_, d, u, a, J);
-  const Mat<3, 7> E = slip_jacobian(d);
-
-  x_next = x;
-  x_next.head<5>() += kTickS * x.segment<5>(M::kThetaDotX);
-  x_next.segment<5>(M::kThetaDotX) += kTickS * a;
-  x_next(M::kSlipX) += kTickS * d(MbbrHighYaw::kThetaY) * d(MbbrHighYaw::kThetaDotZ);
-  x_next(M::kSlipY) -= kTickS * d(MbbrHighYaw::kThetaX) * d(MbbrHighYaw::kThetaDotZ);
-  x_next(M::kSlipZ) += kTickS * (d(MbbrHighYaw::kThetaY) * d(MbbrHighYaw::kPhiDotX) -
-                                 d(MbbrHighYaw::kThetaX) * d(MbbrHighYaw::kPhiDotY));
-
-  F.setIdentity();
-  F.block<5, 5>(0, M::kThetaDotX).diagonal().setConstant(kTickS);
-  F.block<5, 2>(M::kThetaDotX, 0) = kTickS * J.leftCols<2>();
-  F.block<5, 5>(M::kThetaDotX, M::kThetaDotX) += kTickS * J.rightCols<5>();
-  F.block<3, 2>(M::kSlipX, 0) = kTickS * E.leftCols<2>();
-  F.block<3, 5>(M::kSlipX, M::kThetaDotX) = kTickS * E.rightCols<5>();
+  const auto derivative = [this, &u](const Vec<13>& at, Vec<13>& x_dot, Mat<13, 13>& A) {
+    MbbrHighYaw::State d;
+    d << at.head<2>(), at.segment<5>(M::kThetaDotX);
+    Vec<5> a;
+    Mat<5, 7> J;
+    MbbrHighYaw::accelerations(c_, d, u, a, J);
+    const Mat<3, 7> E = slip_jacobian(d);
+    x_dot.head<5>() = at.segment<5>(M::kThetaDotX);
+    x_dot.segment<5>(M::kThetaDotX) = a;
+    x_dot(M::kSlipX) = d(MbbrHighYaw::kThetaY) * d(MbbrHighYaw::kThetaDotZ);
+    x_dot(M::kSlipY) = -d(MbbrHighYaw::kThetaX) * d(MbbrHighYaw::kThetaDotZ);
+    x_dot(M::kSlipZ) = d(MbbrHighYaw::kThetaY) * d(MbbrHighYaw::kPhiDotX) -
+                       d(MbbrHighYaw::kThetaX) * d(MbbrHighYaw::kPhiDotY);
+    A.setZero();
+    A.block<5, 5>(0, M::kThetaDotX).setIdentity();
+    A.block<5, 2>(M::kThetaDotX, 0) = J.leftCols<2>();
+    A.block<5, 5>(M::kThetaDotX, M::kThetaDotX) = J.rightCols<5>();
+    A.block<3, 2>(M::kSlipX, 0) = E.leftCols<2>();
+    A.block<3, 5>(M::kSlipX, M::kThetaDotX) = E.rightCols<5>();
+  };
+  midpoint<13>(derivative, x, kTickS, x_next, F);
 }
 
 Mat<13, 3> MbbrModel13::input_matrix() const noexcept {
-  Mat<13, 3> B = Mat<13, 3>::Zero();
-  B.middleRows<5>(MbbrPublishedModel::kThetaDotX) = MbbrHighYaw::rate_input_matrix(c_);
+  Mat<13, 3> B;
+  Vec<13> free;
+  Vec<13> driven;
+  Mat<13, 13> F;
+  predict(Vec<13>::Zero(), Vec3::Zero(), free, F);
+  for (int k = 0; k < 3; ++k) {
+    predict(Vec<13>::Zero(), Vec3::Unit(k), driven, F);
+    B.col(k) = driven - free;
+  }
   return B;
 }
 

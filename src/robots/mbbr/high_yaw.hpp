@@ -1,9 +1,9 @@
 // The corrected high-yaw-rate model of the MBBR, in the 13 printed states and in its 10 observable ones.
 // Accelerations and accelerometer rows come from the derivation script (config/generated/mbbr_model.hpp);
-// this file adds the kinematics, the encoder rows, [T] (5.31)-(5.33), the transport term of the turning frame
-// that [T] lacks, and explicit Euler, (6.1). f and h see phi*, theta_z and x11..x13 only through phi_x* +
-// x11, phi_y* + x12 and x13 - theta_z, so three of the 13 states are unobservable; the 10-state form keeps
-// just these sums. RT-safe.
+// this file adds the kinematics, the encoder rows, [T] (5.31)-(5.33), and the transport term of the turning
+// frame that [T] lacks. f and h see phi*, theta_z and x11..x13 only through phi_x* + x11, phi_y* + x12 and
+// x13 - theta_z, so three of the 13 states are unobservable; the 10 observable ones keep just these sums.
+// RT-safe.
 #pragma once
 
 #include "generated/mbbr_model.hpp"
@@ -28,22 +28,22 @@ struct MbbrHighYaw {
                             Mat<5, 7>& J) noexcept;  // gyro x, y, z, accelerometer x, y
 };
 
-/// States: theta_x, theta_y, e_x, e_y, e_z, theta_x', theta_y', theta_z', phi_x*', phi_y*';
+/// The observable states: theta_x, theta_y, e_x, e_y, e_z, theta_x', theta_y', theta_z', phi_x*', phi_y*';
 /// e_x = phi_x* + x11, e_y = phi_y* + x12, e_z = x13 - theta_z.
-class MbbrModel10 {
- public:
-  static constexpr int kStates = 10;
-  static constexpr int kInputs = 3;
-  static constexpr int kOutputs = 8;
-  enum State : int { kThetaX, kThetaY, kE, kThetaDotX = 5, kThetaDotY, kThetaDotZ, kPhiDotX, kPhiDotY };
+struct MbbrObservable {
+  using State = Vec<10>;
+  enum Index : int { kThetaX, kThetaY, kE, kThetaDotX = 5, kThetaDotY, kThetaDotZ, kPhiDotX, kPhiDotY };
 
-  explicit MbbrModel10(const MbbrParameters& p) : c_(mbbr_coefficients(p)) {}
-  void predict(const Vec<10>& x, const Vec3& u, Vec<10>& x_next, Mat<10, 10>& F) const noexcept;
-  Mat<10, 3> input_matrix() const noexcept;
-  void measure(const Vec<10>& x, const Vec3& u, Vec<8>& y, Mat<8, 10>& H) const noexcept;
-
- private:
-  MbbrCoefficients c_;
+  static MbbrHighYaw::State dynamic(const State& x) noexcept {
+    MbbrHighYaw::State d;
+    d << x.head<2>(), x.tail<5>();
+    return d;
+  }
+  /// dx/dt and its Jacobian.
+  static void derivative(const MbbrCoefficients& c, const State& x, const Vec3& u, State& x_dot,
+                         Mat<10, 10>& A) noexcept;
+  /// Rate of the ball against the body, body axes, as the encoders see it.
+  static Vec3 encoder_rate_B(const State& x) noexcept;
 };
 
 /// States as printed, [T] (5.30).

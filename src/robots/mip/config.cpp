@@ -33,6 +33,23 @@ MipParameters read_robot(Section s) {
   return p;
 }
 
+MipEkf::Params read_ekf(Section s) {
+  constexpr int n = MipEkfModel::kStates;
+  MipEkf::Params p;
+  p.options.estimate_gyro_bias = s.boolean("estimate_gyro_bias");
+  p.options.estimate_mount = s.boolean("estimate_mount");
+  p.options.know_lever_arm = s.boolean("know_lever_arm");
+  p.options.estimate_lever_arm = s.boolean("estimate_lever_arm");
+  p.filter.Q = s.vector<n>("q", 0.0, 1e6);
+  p.filter.R = s.vector<MipEkfModel::kOutputs>("r", 1e-15, 1e6);
+  p.filter.input_variance = s.vector<2>("input_variance", 0.0, 100.0);
+  p.filter.initial_variance = s.vector<n>("initial_sigma", 0.0, 30.0).cwiseAbs2();
+  p.disturbance_time_constant_s = s.number("disturbance_time_constant_s", kTickS, 1e6);
+  p.sensor_age_s = s.number("sensor_age_s", 0.0, TimeBase<2, 2>::kMaxAge_s);
+  s.finish();
+  return p;
+}
+
 MipEstimatorParams read_estimators(Section s, const MipParameters& robot) {
   MipEstimatorParams p;
   p.robot = robot;
@@ -42,11 +59,7 @@ MipEstimatorParams read_estimators(Section s, const MipParameters& robot) {
   complementary.finish();
   read_filter<KalmanFilter<MipInclinometerModel>>(s.table("complementary_kf"), p.complementary_kf);
   read_filter<KalmanFilter<MipPlanarModel>>(s.table("planar_kf"), p.planar_kf);
-  Section ekf = s.table("ekf");
-  p.ekf_options.estimate_gyro_bias = ekf.boolean("estimate_gyro_bias");
-  p.ekf_options.know_lever_arm = ekf.boolean("know_lever_arm");
-  p.ekf_options.estimate_lever_arm = ekf.boolean("estimate_lever_arm");
-  read_filter<KalmanFilter<MipHighYawModel>>(ekf, p.ekf);
+  p.ekf = read_ekf(s.table("ekf"));
   read_filter<KalmanFilter<MipPublishedModel>>(s.table("ekf_published"), p.ekf_published);
   s.finish();
   return p;

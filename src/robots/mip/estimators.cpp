@@ -7,7 +7,7 @@ MipEstimators::MipEstimators(const Params& params)
       kinematics_(params.robot),
       complementary_kf_(MipInclinometerModel{}, params.complementary_kf),
       planar_kf_(MipPlanarModel(params.robot), params.planar_kf),
-      ekf_(MipHighYawModel(params.robot, params.ekf_options), params.ekf),
+      ekf_(params.robot, params.ekf),
       ekf_published_(MipPublishedModel{}, params.ekf_published) {}
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {
@@ -19,9 +19,7 @@ void MipEstimators::start(const Mip::Sample& z) noexcept {
 
   complementary_kf_.reset({lean, 0.0});
   planar_kf_.reset({lean, phi, 0.0, 0.0});
-  Vec<8> x8 = Vec<8>::Zero();
-  x8.head<3>() << lean, phi, heading_;
-  ekf_.reset(x8);
+  ekf_.start(lean, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
   Vec<6> x6 = Vec<6>::Zero();
   x6.head<3>() << lean, phi, heading_;
   ekf_published_.reset(x6);
@@ -91,22 +89,12 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
 }
 
 void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
-  const bool e = z.encoders_ok;
-  const bool i = z.imu_ok;
-  Vec<6> y;
-  y << kinematics_.phi(z.wheel_angle_rad), z.gyro_B_rad_s.x(), z.accel_B_m_s2.y(),
-      kinematics_.psi(z.wheel_angle_rad), z.gyro_B_rad_s.y(), z.gyro_B_rad_s.z();
   ekf_.predict(u);
-  ekf_.update(u, y, {e, i, i, e, i, i});
+  ekf_.update(z);
   MipEstimate& x = estimates_[index(Id::kEkf)];
-  const Vec<8>& state = ekf_.x();
-  x.theta = state(MipHighYawModel::kTheta);
-  x.phi = state(MipHighYawModel::kPhi);
-  x.psi = state(MipHighYawModel::kPsi);
-  x.theta_dot = state(MipHighYawModel::kThetaDot);
-  x.phi_dot = state(MipHighYawModel::kPhiDot);
-  x.psi_dot = state(MipHighYawModel::kPsiDot);
-  x.normalized_innovation = ekf_.normalized_innovation();
+  const Vec2 position = x.position_W_m;
+  x = ekf_.estimate();
+  x.position_W_m = position;
 }
 
 void MipEstimators::ekf_published(const Mip::Sample& z, const Vec2& u) noexcept {

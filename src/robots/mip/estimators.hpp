@@ -8,7 +8,9 @@
 #include <array>
 
 #include "equipoise/estimate/kalman.hpp"
+#include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "robots/mip/ekf.hpp"
 #include "robots/mip/mip.hpp"
 #include "robots/mip/models.hpp"
 #include "robots/mip/published.hpp"
@@ -34,8 +36,7 @@ struct MipEstimatorParams {
   double heading_time_constant_s = 0.5;  // gyro above, encoders below
   KalmanFilter<MipInclinometerModel>::Params complementary_kf;
   KalmanFilter<MipPlanarModel>::Params planar_kf;
-  KalmanFilter<MipHighYawModel>::Params ekf;
-  MipHighYawOptions ekf_options;
+  MipEkf::Params ekf;
   KalmanFilter<MipPublishedModel>::Params ekf_published;
   MipParameters robot;
 };
@@ -58,6 +59,8 @@ class MipEstimators {
 
   bool runs(Id id) const noexcept { return id == params_.active || params_.compare; }
   const MipEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
+  /// The default filter: rows, variances, predicted wheel rates.
+  const MipEkf& ekf() const noexcept { return ekf_; }
 
  private:
   static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
@@ -75,9 +78,10 @@ class MipEstimators {
   MipKinematics kinematics_;
   KalmanFilter<MipInclinometerModel> complementary_kf_;
   KalmanFilter<MipPlanarModel> planar_kf_;
-  KalmanFilter<MipHighYawModel> ekf_;
+  MipEkf ekf_;
   KalmanFilter<MipPublishedModel> ekf_published_;
   RestTilt rest_tilt_;
+  RestBias rest_bias_;
   std::array<MipEstimate, kCount> estimates_{};
   double heading_ = 0.0;        // of gyro and encoders
   double gyro_previous_ = 0.0;  // x, of the last tick

@@ -23,65 +23,6 @@ MipCoefficients mip_coefficients(const MipParameters& p, double l_ay, double l_a
   return generated::mip::coefficients<double>(g);
 }
 
-MipHighYawModel::MipHighYawModel(const MipParameters& p, const MipHighYawOptions& options) noexcept
-    : c_(options.know_lever_arm ? mip_coefficients(p, p.l_a.y(), p.l_a.z()) : mip_coefficients(p, 0.0, p.l)),
-      bias_(options.estimate_gyro_bias ? 1.0 : 0.0),
-      lever_arm_(options.estimate_lever_arm ? 1.0 : 0.0) {}
-
-void MipHighYawModel::predict(const Vec<8>& x, const Vec2& u, Vec<8>& x_next, Mat<8, 8>& F) const noexcept {
-  const double in[4] = {x(kTheta), x(kThetaDot), x(kPhiDot), x(kPsiDot)};
-  const double input[2] = {u.x(), u.y()};
-  double a[3];
-  double J[3][4];
-  generated::mip::accelerations(c_, in, input, a, J);
-  constexpr int kColumn[4] = {kTheta, kThetaDot, kPhiDot, kPsiDot};
-  x_next = x;
-  x_next.segment<3>(kTheta) += kTickS * x.segment<3>(kThetaDot);  // (3.36)
-  F.setIdentity();
-  F.block<3, 3>(kTheta, kThetaDot).diagonal().setConstant(kTickS);
-  for (int i = 0; i < 3; ++i) {
-    x_next(kThetaDot + i) += kTickS * a[i];
-    for (int k = 0; k < 4; ++k) F(kThetaDot + i, kColumn[k]) += kTickS * J[i][k];
-  }
-}
-
-Mat<8, 2> MipHighYawModel::input_matrix() const noexcept {
-  Mat<8, 2> B = Mat<8, 2>::Zero();
-  B(kThetaDot, 0) = kTickS * c_.theta_ddot_ux;
-  B(kPhiDot, 0) = kTickS * c_.phi_ddot_ux;
-  B(kPsiDot, 1) = kTickS * c_.psi_ddot_uz;
-  return B;
-}
-
-void MipHighYawModel::measure(const Vec<8>& x, const Vec2& u, Vec<6>& y, Mat<6, 8>& H) const noexcept {
-  const double in[4] = {x(kTheta), x(kThetaDot), x(kPhiDot), x(kPsiDot)};
-  const double input[2] = {u.x(), u.y()};
-  double a[1];
-  double J[1][4];
-  generated::mip::accelerometer(c_, in, input, a, J);
-  const double turn = x(kPsiDot);
-  const double arm = lever_arm_ * x(kLeverArm);
-  y(kEncoderPhi) = x(kPhi);
-  y(kGyroX) = x(kThetaDot) + bias_ * x(kGyroBias);
-  y(kAccelY) = a[0] + arm * turn * turn;
-  y(kEncoderPsi) = x(kPsi);
-  y(kGyroY) = x(kTheta) * turn;
-  y(kGyroZ) = turn;
-  H.setZero();
-  H(kEncoderPhi, kPhi) = 1.0;
-  H(kGyroX, kThetaDot) = 1.0;
-  H(kGyroX, kGyroBias) = bias_;
-  H(kAccelY, kTheta) = J[0][0];
-  H(kAccelY, kThetaDot) = J[0][1];
-  H(kAccelY, kPhiDot) = J[0][2];
-  H(kAccelY, kPsiDot) = J[0][3] + 2.0 * arm * turn;
-  H(kAccelY, kLeverArm) = lever_arm_ * turn * turn;
-  H(kEncoderPsi, kPsi) = 1.0;
-  H(kGyroY, kTheta) = turn;
-  H(kGyroY, kPsiDot) = x(kTheta);
-  H(kGyroZ, kPsiDot) = 1.0;
-}
-
 void MipPlanarModel::predict(const Vec<4>& x, const Vec<1>& u, Vec<4>& x_next, Mat<4, 4>& F) const noexcept {
   const double in[3] = {x(0), x(2), x(3)};
   const double input[1] = {u(0)};

@@ -1,5 +1,5 @@
-// Models of the MIP's filters, for KalmanFilter: high yaw rate with gyro bias and lever arm, planar, and the
-// inclinometer with gyro bias. Coefficients come from the derivation (config/generated/mip_model.hpp).
+// Models of the MIP's smaller filters, for KalmanFilter: planar, and the inclinometer with gyro bias.
+// Coefficients come from the derivation (config/generated/mip_model.hpp).
 // Source: [T] (3.1), (3.30), (3.32), (3.35)-(3.47); corrections in docs/derivation.md. RT-safe.
 #pragma once
 
@@ -12,33 +12,6 @@ using MipCoefficients = generated::mip::Coefficients<double>;
 
 /// `l_ay`, `l_az`: where the filter believes the IMU to be, from the axle.
 MipCoefficients mip_coefficients(const MipParameters& p, double l_ay, double l_az) noexcept;
-
-struct MipHighYawOptions {
-  bool estimate_gyro_bias = true;
-  bool know_lever_arm = true;      // the configured IMU position; false: at the centre of mass, as in [T]
-  bool estimate_lever_arm = true;  // its y, starting from the above
-};
-
-/// States and measurements of [T] (3.37), (3.45), and beside them gyro bias, lever arm, gyro y and z:
-/// turning, the gyro's y axis sees theta psi', whatever the accelerometer feels.
-class MipHighYawModel {
- public:
-  static constexpr int kStates = 8;
-  static constexpr int kInputs = 2;
-  static constexpr int kOutputs = 6;
-  enum State : int { kTheta, kPhi, kPsi, kThetaDot, kPhiDot, kPsiDot, kGyroBias, kLeverArm };
-  enum Output : int { kEncoderPhi, kGyroX, kAccelY, kEncoderPsi, kGyroY, kGyroZ };
-
-  MipHighYawModel(const MipParameters& p, const MipHighYawOptions& options) noexcept;
-  void predict(const Vec<8>& x, const Vec2& u, Vec<8>& x_next, Mat<8, 8>& F) const noexcept;
-  Mat<8, 2> input_matrix() const noexcept;
-  void measure(const Vec<8>& x, const Vec2& u, Vec<6>& y, Mat<6, 8>& H) const noexcept;
-
- private:
-  MipCoefficients c_;
-  double bias_;  // 1 where estimated, else 0
-  double lever_arm_;
-};
 
 /// theta, phi, theta', phi'; input u_x; measurements phi, gyro x, accelerometer y. (3.32)
 class MipPlanarModel {

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "robots/mbbr/dynamics.hpp"
+#include "robots/mbbr/ekf.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/published.hpp"
 #include "support/oracle.hpp"
@@ -49,7 +50,8 @@ TEST(KalmanFilter, CovarianceStaysSymmetricToTheBitAndPositive) {
 
 /// Numerical Jacobians of a model.
 template <class Model, int n, int m>
-void expect_jacobians_match(const Model& model, const Vec<n>& x, const Vec3& u, double tolerance) {
+void expect_jacobians_match(const Model& model, const Vec<n>& x, const Vec3& u, double tolerance,
+                            int columns = n) {
   Vec<n> f0;
   Mat<n, n> F;
   Vec<m> y0;
@@ -57,7 +59,7 @@ void expect_jacobians_match(const Model& model, const Vec<n>& x, const Vec3& u, 
   model.predict(x, u, f0, F);
   model.measure(x, u, y0, H);
   constexpr double h = 1e-6;
-  for (int j = 0; j < n; ++j) {
+  for (int j = 0; j < columns; ++j) {
     Vec<n> fp, fm;
     Vec<m> yp, ym;
     Mat<n, n> unused_F;
@@ -78,9 +80,14 @@ TEST(MbbrModels, AnalyticJacobiansAreTheDerivatives) {
   x13 << 0.05, -0.03, 0.4, 1.0, -2.0, 0.3, 0.2, 6.0, 4.0, -3.0, 0.1, 0.2, 0.3;
   expect_jacobians_match<MbbrPublishedModel, 13, 8>({}, x13, u, 1e-7);
   expect_jacobians_match<MbbrModel13, 13, 8>(MbbrModel13(MbbrParameters{}), x13, u, 1e-7);
-  Vec<10> x10;
-  x10 << 0.05, -0.03, 1.0, -2.0, 0.3, 0.3, 0.2, 6.0, 4.0, -3.0;
-  expect_jacobians_match<MbbrModel10, 10, 8>(MbbrModel10(MbbrParameters{}), x10, u, 1e-7);
+  // With a straight mount and no disturbance: their products with small states are left out of F and H.
+  Vec<17> x17 = Vec<17>::Zero();
+  x17.head<10>() << 0.05, -0.03, 1.0, -2.0, 0.3, 0.3, 0.2, 6.0, 4.0, -3.0;
+  MbbrParameters beside;
+  beside.l_a << 0.03, -0.02, 0.13;
+  expect_jacobians_match<MbbrEkfModel, 17, 8>(MbbrEkfModel(beside, 1.0), x17, u, 1e-7,
+                                              MbbrEkfModel::kDisturbance);
+  expect_jacobians_match<MbbrEkfModel, 17, 8>(MbbrEkfModel(beside, 1.0), Vec<17>::Zero(), Vec3::Zero(), 1e-7);
   Vec<8> x8;
   x8 << 0.05, -0.03, 1.0, -2.0, 0.3, 0.2, 4.0, -3.0;
   expect_jacobians_match<MbbrLinearModel, 8, 6>(MbbrLinearModel(MbbrParameters{}, true), x8,
@@ -90,7 +97,7 @@ TEST(MbbrModels, AnalyticJacobiansAreTheDerivatives) {
 TEST(MbbrModels, CorrectedModelIsTheExactDynamicsForSmallTilt) {
   const MbbrParameters p;
   const MbbrDynamics exact(p);
-  const MbbrModel10 model(p);
+  const MbbrEkfModel model(p, 1.0);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (int k = 0; k < 50; ++k) {
@@ -102,44 +109,52 @@ TEST(MbbrModels, CorrectedModelIsTheExactDynamicsForSmallTilt) {
     const MbbrMotion m(x.head<2>(), body_rates(x.head<2>(), x.segment<3>(5)), x.tail<2>());
     const Vec3 tau = p.k1 * u - (p.k2_ball + p.mu_v) * MbbrDynamics::encoder_rate_B(m);
     const MbbrAccelerations a = exact.accelerations(m, tau);
-    Vec<10> next;
-    Mat<10, 10> F;
-    model.predict(x, u, next, F);
+    Vec<10> x_dot;
+    Mat<10, 10> A;
+    MbbrObservable::derivative(mbbr_coefficients(p), x, u, x_dot, A);
     Vec<5> rates;
     rates << MbbrDynamics::theta_ddot(m, a), MbbrDynamics::phi_star_ddot(m, a);
-    EXPECT_LT(test::relative_error(((next - x).tail<5>() / kTickS).eval(), rates), 1e-6);
+    EXPECT_LT(test::relative_error(x_dot.tail<5>().eval(), rates), 1e-6);
+    EXPECT_LT((MbbrObservable::encoder_rate_B(x) - MbbrDynamics::encoder_rate_B(m)).norm(), 1e-8);
     Vec<8> y;
-    Mat<8, 10> H;
-    model.measure(x, u, y, H);
+    Mat<8, 17> H;
+    Vec<17> state = Vec<17>::Zero();
+    state.head<10>() = x;
+    model.measure(state, u, y, H);
     EXPECT_LT((y.head<3>() - m.omega_B).norm(), 1e-8);
     EXPECT_LT((y.tail<2>() - exact.accelerometer_B(m, a).head<2>()).norm(), 1e-6);
   }
 }
 
-TEST(MbbrModels, TenStatesGiveTheSameObservableEstimatesAsThirteen) {
+TEST(MbbrModels, ObservableStatesGiveTheSameEstimatesAsThirteen) {
   const MbbrParameters p;
-  KalmanFilter<MbbrModel10>::Params p10;
-  p10.Q << 1e-8, 1e-8, 2e-8, 2e-8, 2e-8, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3;
-  p10.R << 2.08e-6, 2.08e-6, 2.08e-6, 1.2e-5, 1.2e-5, 1.2e-5, 1.41, 1.41;
-  p10.input_variance = Vec3::Constant(0.1);
+  const MbbrKinematics kinematics(p);
+  const double ratio = p.r / p.r_w;
+  KalmanFilter<MbbrEkfModel>::Params observable;
+  observable.Q.setZero();
+  observable.Q.head<10>() << 1e-8, 1e-8, 2e-8, 2e-8, 2e-8, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3;
+  observable.R << 2.08e-6, 2.08e-6, 2.08e-6, Vec3::Constant(1.2e-5 * ratio * ratio), 1.41, 1.41;
+  observable.input_variance = Vec3::Constant(0.1);
   KalmanFilter<MbbrModel13>::Params p13;
   p13.Q << 1e-8, 1e-8, 1e-8, 1e-8, 1e-8, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-8, 1e-8, 1e-8;  // sums: two of 1e-8
-  p13.R = p10.R;
-  p13.input_variance = p10.input_variance;
-  p10.initial_variance = p13.initial_variance = 0.0;
-  KalmanFilter<MbbrModel10> ten(MbbrModel10(p), p10);
+  p13.R << 2.08e-6, 2.08e-6, 2.08e-6, 1.2e-5, 1.2e-5, 1.2e-5, 1.41, 1.41;
+  p13.input_variance = observable.input_variance;
+  observable.initial_variance.setZero();
+  p13.initial_variance.setZero();
+  KalmanFilter<MbbrEkfModel> fewer(MbbrEkfModel(p, 1.0), observable);
   KalmanFilter<MbbrModel13> thirteen(MbbrModel13(p), p13);
   std::array<bool, 8> all;
   all.fill(true);
   for (const auto& row : test::oracle_rows("ekf_published_trace")) {
     const Vec3 u = test::vector_of<3>(row, "u");
-    const Vec<8> y = test::vector_of<8>(row, "y");
-    ten.predict(u);
-    ten.update(u, y, all);
+    Vec<8> y = test::vector_of<8>(row, "y");
     thirteen.predict(u);
     thirteen.update(u, y, all);
-    ASSERT_LT((ten.x().head<2>() - thirteen.x().head<2>()).norm(), 1e-10);
-    ASSERT_LT((ten.x().tail<5>() - thirteen.x().segment<5>(5)).norm(), 1e-9);
+    y.segment<3>(3) = kinematics.wheels_from_ball(y.segment<3>(3));
+    fewer.predict(u);
+    fewer.update(u, y, all);
+    ASSERT_LT((fewer.x().head<2>() - thirteen.x().head<2>()).norm(), 1e-10);
+    ASSERT_LT((fewer.x().segment<5>(5) - thirteen.x().segment<5>(5)).norm(), 1e-9);
   }
 }
 

@@ -1,80 +1,108 @@
 // Coefficients from physics.md section 2 (derived) and [T] (3.38)-(3.47) (printed); Jacobians by differences.
 #include <gtest/gtest.h>
 
-#include "robots/mip/models.hpp"
+#include <Eigen/Geometry>
+
+#include "robots/mip/config.hpp"
+#include "robots/mip/ekf.hpp"
 #include "robots/mip/published.hpp"
 
 namespace equipoise {
 namespace {
 
-using M = MipHighYawModel;
+using M = MipEkfModel;
 
-MipHighYawModel model(bool lever_arm) {
+M model(bool lever_arm) {
   MipParameters p;
   p.l_a = Vec3(0.0, 0.016, p.l);
-  return {p, {true, lever_arm, lever_arm}};
+  return {p, {true, true, lever_arm, lever_arm}, 1.0};
 }
 
-TEST(MipHighYawModel, HasTheDerivedCoefficients) {
-  Vec<8> x = Vec<8>::Zero();
-  x(M::kTheta) = 1.0;
-  Vec<8> next;
-  Mat<8, 8> F;
-  model(false).predict(Vec<8>::Zero(), Vec2::Zero(), next, F);
-  EXPECT_NEAR(F(M::kThetaDot, M::kTheta), 0.629, 1e-3);
-  EXPECT_NEAR(F(M::kThetaDot, M::kPhiDot), 0.0681, 1e-4);
-  EXPECT_NEAR(F(M::kPhiDot, M::kPhiDot), 0.813, 1e-3);
-  EXPECT_NEAR(F(M::kPhiDot, M::kTheta), -1.115, 1e-3);
-  EXPECT_NEAR(F(M::kPsiDot, M::kPsiDot), 0.939, 1e-3);
-  const Mat<8, 2> B = model(false).input_matrix();
-  EXPECT_NEAR(B(M::kThetaDot, 0), -2.72, 1e-2);
-  EXPECT_NEAR(B(M::kPhiDot, 0), 7.47, 1e-2);
-  EXPECT_NEAR(B(M::kPsiDot, 1), 2.43, 1e-2);
+TEST(MipEkfModel, HasTheDerivedCoefficients) {
+  M::Motion x = M::Motion::Zero();
+  M::Motion x_dot;
+  Mat<6, 6> A;
+  model(false).derivative(x, Vec2::Zero(), x_dot, A);
+  EXPECT_NEAR(kTickS * A(M::kThetaDot, M::kTheta), 0.629, 1e-3);
+  EXPECT_NEAR(kTickS * A(M::kThetaDot, M::kPhiDot), 0.0681, 1e-4);
+  EXPECT_NEAR(1.0 + kTickS * A(M::kPhiDot, M::kPhiDot), 0.813, 1e-3);
+  EXPECT_NEAR(kTickS * A(M::kPhiDot, M::kTheta), -1.115, 1e-3);
+  EXPECT_NEAR(1.0 + kTickS * A(M::kPsiDot, M::kPsiDot), 0.939, 1e-3);
+  model(false).derivative(x, Vec2(1.0, 1.0), x_dot, A);
+  EXPECT_NEAR(kTickS * x_dot(M::kThetaDot), -2.72, 1e-2);
+  EXPECT_NEAR(kTickS * x_dot(M::kPhiDot), 7.47, 1e-2);
+  EXPECT_NEAR(kTickS * x_dot(M::kPsiDot), 2.43, 1e-2);
   x(M::kPsiDot) = 1.0;
-  model(false).predict(x, Vec2::Zero(), next, F);
-  EXPECT_NEAR(F(M::kThetaDot, M::kTheta) - 0.629, 0.0030, 1e-3);
-  EXPECT_NEAR(F(M::kPhiDot, M::kTheta) + 1.115, -0.0053, 1e-3);
+  model(false).derivative(x, Vec2::Zero(), x_dot, A);
+  EXPECT_NEAR(kTickS * A(M::kThetaDot, M::kTheta) - 0.629, 0.0030, 1e-3);
+  EXPECT_NEAR(kTickS * A(M::kPhiDot, M::kTheta) + 1.115, -0.0053, 1e-3);
 }
 
-TEST(MipHighYawModel, JacobiansAgreeWithDifferences) {
-  const MipHighYawModel m = model(true);
-  Vec<8> x;
-  x << 0.1, 0.5, 0.3, -0.4, 3.0, 8.0, 0.01, 0.004;
+TEST(MipEkfModel, JacobiansAgreeWithDifferences) {
+  const M m = model(true);
+  Vec<12> x;
+  x << 0.1, 0.5, 0.3, -0.4, 3.0, 8.0, 0.02, -0.03, 0.01, 0.004, 0.0, 0.0;
   const Vec2 u(0.3, -0.2);
-  Vec<8> f0;
-  Mat<8, 8> F;
+  Vec<12> f0;
+  Mat<12, 12> F;
   m.predict(x, u, f0, F);
   Vec<6> h0;
-  Mat<6, 8> H;
+  Mat<6, 12> H;
   m.measure(x, u, h0, H);
   constexpr double kStep = 1e-6;
-  for (int i = 0; i < 8; ++i) {
-    Vec<8> up = x;
-    Vec<8> down = x;
+  for (int i = 0; i < 12; ++i) {
+    Vec<12> up = x;
+    Vec<12> down = x;
     up(i) += kStep;
     down(i) -= kStep;
-    Vec<8> f_up, f_down;
-    Mat<8, 8> ignored_F;
+    Vec<12> f_up, f_down;
+    Mat<12, 12> ignored_F;
     m.predict(up, u, f_up, ignored_F);
     m.predict(down, u, f_down, ignored_F);
     EXPECT_LT(((f_up - f_down) / (2 * kStep) - F.col(i)).norm(), 1e-6) << "state " << i;
     Vec<6> h_up, h_down;
-    Mat<6, 8> ignored_H;
+    Mat<6, 12> ignored_H;
     m.measure(up, u, h_up, ignored_H);
     m.measure(down, u, h_down, ignored_H);
     EXPECT_LT(((h_up - h_down) / (2 * kStep) - H.col(i)).norm(), 1e-6) << "state " << i;
   }
 }
 
-TEST(MipHighYawModel, SeesTheCentripetalAccelerationOfItsLeverArm) {
-  Vec<8> x = Vec<8>::Zero();
+TEST(MipEkfModel, SeesTheCentripetalAccelerationOfItsLeverArm) {
+  Vec<12> x = Vec<12>::Zero();
   x(M::kPsiDot) = 10.0;
   Vec<6> y;
-  Mat<6, 8> H;
+  Mat<6, 12> H;
   model(true).measure(x, Vec2::Zero(), y, H);
   EXPECT_NEAR(y(M::kAccelY), 1.6, 1e-9);  // gravity minus acceleration: 0.016 m x 100 /s^2
   model(false).measure(x, Vec2::Zero(), y, H);
   EXPECT_NEAR(y(M::kAccelY), 0.0, 1e-12);
+}
+
+/// A robot that stands upright and turns evenly, seen by a crooked IMU.
+TEST(MipEkf, FindsACrookedMountWhileTurning) {
+  const MipConfig config = load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", {}).config;
+  const double rate_rad_s = 8.0;
+  const Vec2 mount(0.03, -0.02);
+  const Mat3 R_mount =
+      Eigen::AngleAxisd(mount.norm(), Vec3(mount.x(), mount.y(), 0.0).normalized()).toRotationMatrix();
+  const Vec3 accel(0.0, rate_rad_s * rate_rad_s * config.robot.l_a.y(), -kGravity_m_s2);
+  // Holds the rate against back-EMF and viscous friction.
+  const Vec2 u(0.0, (config.robot.k2 + config.robot.mu_v) / config.robot.k1 * config.robot.yaw_to_wheel() *
+                        rate_rad_s);
+  MipEkf filter(config.robot, config.estimators.ekf);
+  for (int k = 0; k < 4000; ++k) {
+    Mip::Sample z;
+    z.gyro_B_rad_s = R_mount.transpose() * Vec3(0.0, 0.0, rate_rad_s);
+    z.accel_B_m_s2 = R_mount.transpose() * accel;
+    z.wheel_angle_rad = MipKinematics(config.robot).wheels(0.0, rate_rad_s * k * kTickS);
+    z.imu_ok = z.encoders_ok = true;
+    filter.predict(u);
+    filter.update(z);
+  }
+  EXPECT_LT((filter.x().segment<2>(M::kMountX) - mount).norm(), 0.003);
+  EXPECT_NEAR(filter.estimate().theta, 0.0, 0.003);
+  EXPECT_NEAR(filter.estimate().psi_dot, rate_rad_s, 0.01);
 }
 
 TEST(MipPublishedModel, IsAsPrinted) {

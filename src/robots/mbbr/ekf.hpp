@@ -1,0 +1,96 @@
+// The MBBR's default filter: the corrected model, discretised by the midpoint rule, with what differs from
+// robot to robot as states: the IMU's mount, gyro bias and torques that the model does not know. In:
+// Measurement, the input applied since the last one -> out: state at the sample's time, normalised innovation
+// of every row, variances. Encoders enter wheel by wheel, so that a lost wheel is a skipped row; missed ticks
+// are predicted. Source: docs/derivation.md; [T] 5.1.6, 6.1. RT-safe.
+#pragma once
+
+#include "equipoise/estimate/kalman.hpp"
+#include "equipoise/estimate/time_base.hpp"
+#include "robots/mbbr/high_yaw.hpp"
+#include "robots/mbbr/mbbr.hpp"
+
+namespace equipoise {
+
+/// States: the 10 observable ones; mount angles about body x, y (sensor against body); gyro bias x, y;
+/// disturbance of u, its x, y standing in the inertial frame. Bias z: from rest only, in motion roller tilt
+/// fakes yaw.
+class MbbrEkfModel {
+ public:
+  static constexpr int kStates = 17;
+  static constexpr int kInputs = 3;
+  static constexpr int kOutputs = 8;
+  enum State : int {
+    kThetaX,
+    kThetaY,
+    kE,
+    kThetaDotX = 5,
+    kThetaDotY,
+    kThetaDotZ,
+    kPhiDotX,
+    kPhiDotY,
+    kMountX,
+    kMountY,
+    kBiasX,
+    kBiasY,
+    kDisturbance
+  };
+  enum Output : int { kGyro, kWheel = 3, kAccel = 6 };  // three, three, two rows
+
+  MbbrEkfModel(const MbbrParameters& p, double disturbance_time_constant_s);
+  void predict(const Vec<17>& x, const Vec3& u, Vec<17>& x_next, Mat<17, 17>& F) const noexcept;
+  Mat<17, 3> input_matrix() const noexcept;
+  void measure(const Vec<17>& x, const Vec3& u, Vec<8>& y, Mat<8, 17>& H) const noexcept;
+  /// The observable states after dt, without a Jacobian.
+  MbbrObservable::State ahead(const MbbrObservable::State& x, const Vec3& u, double dt) const noexcept;
+
+ private:
+  MbbrCoefficients c_;
+  Mat3 wheels_from_ball_;
+  Vec2 lever_arm_;
+  double keep_;  // of the disturbance, per tick
+  Mat<10, 3> B_;
+};
+
+class MbbrEkf {
+ public:
+  using Model = MbbrEkfModel;
+  struct Params {
+    KalmanFilter<Model>::Params filter;
+    double disturbance_time_constant_s = 1.0;
+    double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
+    double push_nis = 6.0;      // more than this in a tick is a push: the rates are in doubt by
+    double push_tilt_rate_variance = 0.02;
+    double push_ball_rate_variance = 0.5;
+  };
+
+  MbbrEkf(const MbbrParameters& robot, const Params& params);
+
+  /// At rest: tilt from the averaged accelerometer, bias from the averaged gyro.
+  void start(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Vec3& wheel_angle_rad) noexcept;
+  /// A tick without samples; `u` acted in it.
+  void predict(const Vec3& u) noexcept;
+  /// The samples at the end of the predicted tick.
+  void update(const Mbbr::Sample& z) noexcept;
+
+  /// Now, that is `sensor_age_s` after the filter's own state.
+  MbbrEstimate estimate() const noexcept;
+  Vec3 wheel_rate_rad_s() const noexcept;
+
+  const Vec<17>& x() const noexcept { return filter_.x(); }
+  const Mat<17, 17>& P() const noexcept { return filter_.P(); }
+  /// gyro x, y, z, wheels, accelerometer x, y: squared innovation over its variance; 0 where not used.
+  const std::array<double, 8>& row_nis() const noexcept { return filter_.row_nis(); }
+  double tilt_sigma_rad() const noexcept { return std::sqrt(P()(0, 0) + P()(1, 1)); }
+
+ private:
+  Params params_;
+  MbbrKinematics kinematics_;
+  KalmanFilter<Model> filter_;
+  TimeBase<3, 3> time_;
+  double gyro_bias_z_ = 0.0;
+  double heading_ = 0.0;
+  Vec2 phi_ = Vec2::Zero();
+};
+
+}  // namespace equipoise

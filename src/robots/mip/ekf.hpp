@@ -1,0 +1,99 @@
+// The MIP's default filter: the high-yaw-rate model, discretised by the midpoint rule, with what differs from
+// robot to robot as states: IMU mount, gyro bias, lever arm, and torques that the model does not know.
+// In: Measurement, the input applied since the last one -> out: state at the sample's time, normalised
+// innovation of every row, variances. Encoders enter wheel by wheel, so that a lost wheel is a skipped row;
+// missed ticks are predicted. Source: [T] (3.35)-(3.47); corrections in docs/derivation.md. RT-safe.
+#pragma once
+
+#include "equipoise/estimate/kalman.hpp"
+#include "equipoise/estimate/time_base.hpp"
+#include "robots/mip/mip.hpp"
+#include "robots/mip/models.hpp"
+
+namespace equipoise {
+
+struct MipEkfOptions {
+  bool estimate_gyro_bias = true;
+  bool estimate_mount = true;
+  bool know_lever_arm = true;      // the configured IMU position; false: at the centre of mass, as in [T]
+  bool estimate_lever_arm = true;  // its y, starting from the above
+};
+
+/// States of [T] (3.37); mount angles about body x, y (sensor against body); bias of gyro x; lever arm y;
+/// disturbance of u. Bias of gyro y and z: from rest only.
+class MipEkfModel {
+ public:
+  static constexpr int kStates = 12;
+  static constexpr int kInputs = 2;
+  static constexpr int kOutputs = 6;
+  enum State : int {
+    kTheta,
+    kPhi,
+    kPsi,
+    kThetaDot,
+    kPhiDot,
+    kPsiDot,
+    kMountX,
+    kMountY,
+    kGyroBias,
+    kLeverArm,
+    kDisturbance
+  };
+  enum Output : int { kGyro, kWheel = 3, kAccelY = 5 };  // three, two, one row
+  using Motion = Vec<6>;                                 // the first six states
+
+  MipEkfModel(const MipParameters& p, const MipEkfOptions& options, double disturbance_time_constant_s);
+  void derivative(const Motion& x, const Vec2& u, Motion& x_dot, Mat<6, 6>& A) const noexcept;
+  void predict(const Vec<12>& x, const Vec2& u, Vec<12>& x_next, Mat<12, 12>& F) const noexcept;
+  Mat<12, 2> input_matrix() const noexcept;
+  void measure(const Vec<12>& x, const Vec2& u, Vec<6>& y, Mat<6, 12>& H) const noexcept;
+  /// The motion after dt, without a Jacobian.
+  Motion ahead(const Motion& x, const Vec2& u, double dt) const noexcept;
+
+ private:
+  MipCoefficients c_;
+  double yaw_to_wheel_;
+  double bias_;  // 1 where estimated, else 0
+  double mount_;
+  double lever_arm_;
+  double keep_;  // of the disturbance, per tick
+  Mat<6, 2> B_;
+};
+
+class MipEkf {
+ public:
+  using Model = MipEkfModel;
+  struct Params {
+    KalmanFilter<Model>::Params filter;
+    MipEkfOptions options;
+    double disturbance_time_constant_s = 1.0;
+    double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
+  };
+
+  MipEkf(const MipParameters& robot, const Params& params);
+
+  /// At rest: lean from the averaged accelerometer, bias from the averaged gyro.
+  void start(double lean, const Vec3& gyro_bias_B_rad_s, const Vec2& wheel_angle_rad) noexcept;
+  /// A tick without samples; `u` acted in it.
+  void predict(const Vec2& u) noexcept;
+  /// The samples at the end of the predicted tick.
+  void update(const Mip::Sample& z) noexcept;
+
+  /// Now, that is `sensor_age_s` after the filter's own state; without a position.
+  MipEstimate estimate() const noexcept;
+  Vec2 wheel_rate_rad_s() const noexcept;
+
+  const Vec<12>& x() const noexcept { return filter_.x(); }
+  const Mat<12, 12>& P() const noexcept { return filter_.P(); }
+  /// gyro x, y, z, wheels, accelerometer y: squared innovation over its variance; 0 where not used.
+  const std::array<double, 6>& row_nis() const noexcept { return filter_.row_nis(); }
+  double tilt_sigma_rad() const noexcept { return std::sqrt(P()(0, 0)); }
+
+ private:
+  MipKinematics kinematics_;
+  KalmanFilter<Model> filter_;
+  TimeBase<2, 2> time_;
+  Vec2 gyro_bias_yz_ = Vec2::Zero();
+};
+
+}  // namespace equipoise
