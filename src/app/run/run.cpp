@@ -72,7 +72,7 @@ std::string numbered(const std::string& path, int flight) {
 template <class Firmware>
 class Runner {
  public:
-  Runner(const Arguments& a, const std::vector<std::string>& overrides, const std::string& board_toml)
+  Runner(const Arguments& a, const Overrides& overrides, const std::string& board_toml)
       : a_(a),
         loaded_(Firmware::load(a.config, overrides)),
         config_(Firmware::apply(loaded_.config, a.choice)),
@@ -239,8 +239,7 @@ int run_lockstep(const Arguments& a) {
 
 template <class Firmware>
 int run_board(const Arguments& a, const Board& board, const std::string& board_toml) {
-  std::vector<std::string> overrides = board.calibration;
-  overrides.insert(overrides.end(), a.set.begin(), a.set.end());
+  const Overrides overrides = overrides_of(board, a.set);
   FlightWatch watch(a.watch);  // before the receiver's thread, and before the board is opened
   Runner<Firmware> runner(a, overrides, board_toml);
   rio_t io{};
