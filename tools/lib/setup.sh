@@ -61,7 +61,7 @@ when_unlocked() {
     [ "$SECONDS" -lt "$deadline" ] || return 1
     [ "$said" = yes ] || say "another program is installing packages; waiting until it has finished (at most 5 minutes)"
     said=yes
-    sleep 2
+    sleep 5
   done
 }
 

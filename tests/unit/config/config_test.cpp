@@ -126,9 +126,16 @@ TEST(Config, AnOverrideReachesAnElementOfAnArray) {
 TEST(Config, WhatNoOverrideCanBeIsRefusedInOneShortLine) {
   std::string deep = "a";
   while (deep.size() < 100000) deep += ".a";
-  for (const std::string& text :
-       {deep + "=1", "motor=" + deep, "motor={" + deep + "=1}", "=1", ".=1", "..=1", "motor.=1",
-        "friction.compensation=0.8\nmotor=1", std::string("a\0b=1", 6)}) {
+  const std::vector<std::string> texts{deep + "=1",
+                                       "motor=" + deep,
+                                       "motor={" + deep + "=1}",
+                                       "=1",
+                                       ".=1",
+                                       "..=1",
+                                       "motor.=1",
+                                       "friction.compensation=0.8\nmotor=1",
+                                       std::string("a\0b=1", 6)};
+  for (const std::string& text : texts) {
     const std::string error = error_of(kMbbr, {text});
     EXPECT_FALSE(error.empty()) << text.substr(0, 40);
     EXPECT_LT(error.size(), 400U);
