@@ -61,11 +61,7 @@ Calibration read_calibration(Section s, int wheels) {
   };
   c.encoder_sign = sign("encoder_sign");
   c.motor_sign = sign("motor_sign");
-  const std::vector<double> mount = s.numbers("R_BS", 9, -1.0, 1.0);
-  c.R_BS = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mount.data());
-  if ((c.R_BS * c.R_BS.transpose() - Mat3::Identity()).norm() > 1e-6 || c.R_BS.determinant() < 0.0) {
-    s.fail("R_BS", "is not a rotation matrix (rows, sensor axes to body axes)");
-  }
+  c.R_BS = s.rotation("R_BS");
   c.gyro_bias_B_rad_s = s.vector<3>("gyro_bias_rad_s", -1.0, 1.0);
   if (s.has("accel_scale")) c.accel_scale_S = s.vector<3>("accel_scale", 0.8, 1.2);  // logs before it: 1
   c.accel_bias_B_m_s2 = s.vector<3>("accel_bias_m_s2", -2.0, 2.0);

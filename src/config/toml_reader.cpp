@@ -2,19 +2,16 @@
 
 #include <sodium.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <sstream>
+
+#include "config/edits.hpp"
 
 namespace equipoise::config {
 namespace {
-
-std::string at(const std::string& path, const toml::source_region& where) {
-  if (where.begin.line == 0) return path;
-  return (where.path ? *where.path : path) + ":" + std::to_string(where.begin.line);
-}
 
 std::string shortest(double value) {
   std::ostringstream text;
@@ -41,109 +38,26 @@ std::size_t distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-void apply_override(toml::table& root, const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    throw ConfigError("--set " + text + ": expected key=value, e.g. --set friction.compensation=0.8");
-  }
-  toml::table patch;
-  try {
-    patch = toml::parse(text.substr(0, equals) + " = " + text.substr(equals + 1));
-  } catch (const toml::parse_error&) {
-    try {  // a bare word is a string
-      patch = toml::parse(text.substr(0, equals) + " = \"" + text.substr(equals + 1) + "\"");
-    } catch (const toml::parse_error& error) {
-      throw ConfigError("--set " + text + ": " + std::string(error.description()));
-    }
-  }
-  toml::table* target = &root;
-  const toml::table* source = &patch;
-  for (;;) {
-    const auto first = source->begin();
-    const toml::key& key = first->first;
-    const toml::node& value = first->second;
-    if (!target->contains(key) && key != "include") {
-      throw ConfigError("--set " + text + ": no such key in the configuration");
-    }
-    if (value.is_table() && target->get(key)->is_table()) {
-      target = target->get_as<toml::table>(key.str());
-      source = value.as_table();
-      continue;
-    }
-    value.visit([&](const auto& v) { target->insert_or_assign(key, v); });
-    return;
-  }
-}
-
-/// Replaces values of `root` by those of a fragment; a key that the configuration lacks is a mistake.
-void merge(toml::table& root, toml::table&& fragment, const std::string& path, const std::string& where) {
-  for (auto&& entry : fragment) {
-    const toml::key& key = entry.first;
-    toml::node& value = entry.second;
-    const std::string name = where.empty() ? std::string(key.str()) : where + "." + std::string(key.str());
-    if (!root.contains(key)) {
-      throw ConfigError(at(path, value.source()) + ": " + name + ": no such key in the configuration");
-    }
-    if (value.is_table() && root.get(key)->is_table()) {
-      merge(*root.get_as<toml::table>(key.str()), std::move(*value.as_table()), path, name);
-    } else {  // moved nodes remember where they stood
-      value.visit([&](auto& v) { root.insert_or_assign(key, std::move(v)); });
-    }
-  }
-}
-
-toml::table parsed(std::istream& text, const std::string& origin) {
-  try {
-    return toml::parse(text, origin);
-  } catch (const toml::parse_error& error) {
-    throw ConfigError(at(origin, error.source()) + ": " + std::string(error.description()));
-  }
-}
-
-/// `include = ["fragment.toml"]`: files beside the configuration whose values replace its own, in order.
-void apply_includes(toml::table& root, const std::string& path) {
-  const toml::node* include = root.get("include");
-  if (include == nullptr) return;
-  const toml::array* files = include->as_array();
-  if (files == nullptr || (!files->empty() && !files->is_homogeneous<std::string>())) {
-    throw ConfigError(path + ": include: expected an array of file names, e.g. include = [\"motor.toml\"]");
-  }
-  const std::string folder = path.substr(0, path.rfind('/') + 1);
-  std::vector<std::string> names;
-  for (const toml::node& node : *files) names.push_back(node.as_string()->get());
-  root.erase("include");
-  for (const std::string& name : names) {
-    std::string fragment = name.rfind('/', 0) == 0 ? "" : folder;
-    fragment += name;
-    std::ifstream file(fragment);
-    if (!file)
-      throw ConfigError(
-          std::string(path).append(": include: ").append(fragment).append(": cannot be opened"));
-    merge(root, parsed(file, fragment), fragment, "");
-  }
-}
-
 }  // namespace
 
-Document::Document(const std::string& path, const std::vector<std::string>& overrides) : path_(path) {
-  std::ifstream file(path);
-  if (!file) throw ConfigError(path + ": cannot be opened; give a configuration with --config FILE");
-  root_ = parsed(file, path);
+Document::Document(const std::string& path, const Overrides& overrides)
+    : path_(path), root_(parsed_file(path, "; give a configuration with --config FILE")) {
   // An include given with --set comes before the other overrides, so that these have the last word.
   const auto includes = [](const std::string& text) { return text.rfind("include=", 0) == 0; };
-  for (const std::string& text : overrides) {
-    if (includes(text)) apply_override(root_, text);
+  for (const std::string& text : overrides.set) {
+    if (includes(text)) apply_set(root_, text);
   }
   apply_includes(root_, path);
-  for (const std::string& text : overrides) {
-    if (!includes(text)) apply_override(root_, text);
+  if (overrides.board) check_board(root_, path, *overrides.board);
+  apply_measured(root_, overrides.measured);
+  for (const std::string& text : overrides.set) {
+    if (!includes(text)) apply_set(root_, text);
   }
 }
 
 Document Document::parse(const std::string& text, const std::string& origin) {
   Document document(origin);
-  std::istringstream stream(text);
-  document.root_ = parsed(stream, origin);
+  document.root_ = parsed_text(text, origin);
   return document;
 }
 
@@ -277,6 +191,14 @@ std::vector<double> Section::numbers(const std::string& key, std::size_t count, 
     values.push_back(*value);
   }
   return values;
+}
+
+Mat3 Section::rotation(const std::string& key) {
+  const std::vector<double> rows = numbers(key, 9, -1.0, 1.0);
+  const Mat3 R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
+  if (!((R * R.transpose() - Mat3::Identity()).norm() <= 1e-6) || R.determinant() < 0.0)
+    fail(key, "is not a rotation matrix (rows, sensor axes to body axes)");
+  return R;
 }
 
 void Section::finish() const {

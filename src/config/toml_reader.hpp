@@ -9,14 +9,15 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
+#include "equipoise/overrides.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise::config {
 
-/// Whole file with `--set` overrides applied; knows where every value stands.
+/// Whole file with its overrides applied; knows where every value stands.
 class Document {
  public:
-  Document(const std::string& path, const std::vector<std::string>& overrides);
+  Document(const std::string& path, const Overrides& overrides);
   /// From text; `origin` takes the path's place in errors.
   static Document parse(const std::string& text, const std::string& origin);
 
@@ -56,6 +57,9 @@ class Section {
   /// Index of the value in `names`.
   std::size_t choice(const std::string& key, const std::vector<std::string>& names);
   std::vector<double> numbers(const std::string& key, std::size_t count, double min, double max);
+
+  /// Rows of a rotation matrix.
+  Mat3 rotation(const std::string& key);
 
   template <int N>
   Vec<N> vector(const std::string& key, double min, double max) {

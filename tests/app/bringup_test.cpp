@@ -187,9 +187,9 @@ TEST(CalibrationFile, RoundTripsAndReachesTheConfigurationInBodyAxes) {
   EXPECT_EQ(again.gyro->stamp.temperature_degC, 31.5);
   EXPECT_FALSE(again.accel->stamp.temperature_degC.has_value());
 
-  const Board board = load_board(kMbbrBoard);
-  const Calibration c =
-      load_mbbr(kSource + "/config/mbbr.toml", overrides_of(file, board.R_BS)).config.calibration;
+  Board board = load_board(kMbbrBoard);
+  board.measured = measured_of(file, board.facts.R_BS);
+  const Calibration c = load_mbbr(kSource + "/config/mbbr.toml", overrides_of(board)).config.calibration;
   EXPECT_EQ(c.R_BS, turned);
   EXPECT_LT((c.gyro_bias_B_rad_s - Vec3(0.0, 0.01, 0.0)).norm(), 1e-15);  // sensor x is body y
   EXPECT_LT((c.accel_bias_B_m_s2 - Vec3(-0.1, 0.0, 0.0)).norm(), 1e-15);

@@ -11,6 +11,11 @@ FAKES = {
     "dpkg": '[ "$1" = --print-architecture ] && echo amd64; exit 0',
     # Writes real calls down. NO_LISTS: knows no package until updated; OLD_LISTS: cannot fetch any.
     "apt-get": """
+if [ -n "$LOCKED" ] && [ ! -e "$CALLS.waited" ]; then
+  case " $* " in *" --simulate "*) exit ;; esac
+  echo "E: Could not get lock /var/lib/dpkg/lock-frontend. It is held by process 1 (apt)"
+  exit 100
+fi
 words=
 for word; do case $word in -* | *::*) ;; *) words="$words $word" ;; esac; done
 case " $* " in *" --simulate "*) [ -z "$NO_LISTS" ] || [ -e "$CALLS.updated" ]; exit ;; esac
@@ -19,6 +24,14 @@ case $words in
 " update") touch "$CALLS.updated" ;;
 *) [ -z "$OLD_LISTS" ] || [ -e "$CALLS.updated" ] ;;
 esac""",
+    "sleep": 'touch "$CALLS.waited"',
+    "cmake": """
+case "$*" in
+"--preset "*) mkdir -p "build/$2"; echo "CMAKE_HOME_DIRECTORY:INTERNAL=$PWD" >"build/$2/CMakeCache.txt"
+  touch "build/$2/build.ninja" ;;
+esac
+echo " cmake $*" >>"$CALLS"
+""",
     "id": 'echo "${FAKE_UID:-0}"',
     "sudo": 'echo " sudo" >>"$CALLS"; exec "$@"',
 }
@@ -38,20 +51,21 @@ def machine(tmp_path, root):
     programs.mkdir()
     calls = tmp_path / "calls"
 
-    def run(groups="host test", without=(), **environment):
+    def run(groups="host test", without=(), script="", **environment):
         for name, body in FAKES.items():
             if name not in without:
                 (programs / name).write_text(f"#!/bin/sh\n{body}\n")
                 (programs / name).chmod(0o755)
-        for name in ("bash", "awk", "cat", "dirname", "env", "nproc", "sh", "touch"):
+        tools = ("awk", "bash", "cat", "dirname", "env", "grep", "mkdir", "nproc", "rm", "sh", "tee", "touch")
+        for name in tools:
             (programs / name).unlink(missing_ok=True)
             (programs / name).symlink_to(
                 next(p for p in (f"/usr/bin/{name}", f"/bin/{name}") if os.path.exists(p))
             )
         calls.write_text("")
-        defaults = {"MISSING": "", "NO_LISTS": "", "OLD_LISTS": "", "FAKE_UID": "0"}
+        defaults = {"MISSING": "", "NO_LISTS": "", "OLD_LISTS": "", "LOCKED": "", "FAKE_UID": "0"}
         result = subprocess.run(
-            [programs / "bash", "-c", f"source {lib}/setup.sh; install_packages {groups}"],
+            [programs / "bash", "-c", f"source {lib}/setup.sh; {script or 'install_packages ' + groups}"],
             env={"PATH": str(programs), "CALLS": str(calls), **defaults, **environment},
             capture_output=True,
             text=True,
@@ -82,6 +96,37 @@ def test_package_lists_are_refreshed_when_they_do_not_serve(machine, lists):
     result, calls = machine(MISSING="cmake", **{lists: "yes"})
     assert result.returncode == 0, result.stderr
     assert calls[-2:] == [" update", " install cmake"]
+
+
+def test_another_installation_is_waited_for_and_said(machine):
+    result, calls = machine(MISSING="cmake", LOCKED="yes")
+    assert result.returncode == 0, result.stderr
+    assert calls == [" install cmake"]
+    assert result.stderr.count("another program is installing packages; waiting") == 1
+
+
+def test_a_failure_that_is_no_lock_is_not_waited_for(machine):
+    result, _ = machine(script="when_unlocked sh -c 'echo no such package; exit 100'")
+    assert result.returncode != 0
+    assert "waiting" not in result.stderr
+
+
+def test_a_build_folder_of_another_tree_is_made_anew(machine, tmp_path):
+    tree, calls = tmp_path / "tree", [" cmake --preset host", " cmake --build build/host"]
+    build = "build host"
+    (tree / "CMakePresets.json").write_text("{}")
+    _, first = machine(script=build)
+    assert [call.split(" -j")[0] for call in first] == calls
+    (tree / "build/host/equipoise").write_text("program")
+    _, second = machine(script=build)
+    assert len(second) == 1  # built, not configured again
+    assert (tree / "build/host/equipoise").exists()
+    cache = tree / "build/host/CMakeCache.txt"
+    cache.write_text(cache.read_text().replace(str(tree), "/somewhere/else"))
+    result, third = machine(script=build)
+    assert [call.split(" -j")[0] for call in third] == calls
+    assert "build/host was made for another folder" in result.stderr
+    assert not (tree / "build/host/equipoise").exists()
 
 
 def test_an_ordinary_user_installs_through_sudo(machine):

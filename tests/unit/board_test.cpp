@@ -1,6 +1,7 @@
 // The board files: what the drivers get, and what is refused.
 #include "app/board/board.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -13,6 +14,11 @@
 namespace equipoise::app {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+const std::string kConfig = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
 const std::string kBoards = std::string(EQUIPOISE_SOURCE_DIR) + "/config/boards/";
 
 std::string text_of(const std::string& path) {
@@ -65,19 +71,65 @@ TEST(Board, MipHasTwoDriveBrakeBridgesOneReversed) {
   EXPECT_TRUE(board.wiring.motor[1].encoder_reversed);
 }
 
-TEST(Board, ItsMountAndBatteryScaleReplaceTheConfigurations) {
-  const std::string text = text_of(kBoards + "robotics_cape_mbbr.toml");
-  std::string turned = text;
-  const std::string mount = "[1, 0, 0, 0, 1, 0, 0, 0, 1]";
-  turned.replace(turned.find(mount), mount.size(), "[0, -1, 0, 1, 0, 0, 0, 0, 1]");
-  const Board board = parse_board(turned, "b.toml");
+// What loading this configuration says to a board file with one text replaced.
+std::string contradiction(const std::string& from, const std::string& to,
+                          const std::vector<std::string>& set = {}) {
+  std::string text = text_of(kBoards + "robotics_cape_mbbr.toml");
+  for (std::size_t at = 0; !from.empty() && (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  try {
+    load_mbbr(kConfig, overrides_of(parse_board(text, "b.toml"), set));
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Board, WhatStandsInTheConfigurationTooMustBeTheSame) {
+  EXPECT_EQ(contradiction("", ""), "");
+  EXPECT_THAT(contradiction("pwm_hz = 20000", "pwm_hz = 19000"),
+              AllOf(StartsWith("b.toml: bridges.pwm_hz: 19000 where " + kConfig + ":"),
+                    HasSubstr(" has motor.pwm_hz = 20000; both must say the same")));
+  EXPECT_THAT(contradiction("mc33926\"", "tb6612\""),
+              AllOf(HasSubstr("wired as drive_brake"), HasSubstr("has motor.bridge = drive_coast")));
+  EXPECT_THAT(contradiction("[1, 0, 0, 0, 1, 0, 0, 0, 1]", "[0, -1, 0, 1, 0, 0, 0, 0, 1]"),
+              HasSubstr("imu.R_BS[0]: 0 where"));
+  EXPECT_THAT(contradiction("V_per_count = 0.004835164835", "V_per_count = 0.0048"),
+              HasSubstr("battery.V_per_count: 0.0048 where"));
+  EXPECT_THAT(contradiction("offset_V = -0.10", "offset_V = -0.11"), HasSubstr("battery.offset_V: -0.11"));
+}
+
+TEST(Board, OneBridgeOfAnotherTypeIsRefused) {
+  EXPECT_THAT(
+      complaint(text_of(kBoards + "robotics_cape_mbbr.toml"), "bridge = \"mc33926\"", "bridge = \"tb6612\""),
+      HasSubstr("motor[1].bridge: differs from the first motor's"));
+}
+
+TEST(Board, AMountThatIsNoRotationIsRefusedWithItsLine) {
+  EXPECT_THAT(complaint(text_of(kBoards + "robotics_cape_mbbr.toml"), "[1, 0, 0, 0, 1, 0, 0, 0, 1]",
+                        "[1, 0, 0, 0, 1, 0, 0, 0, 0.5]"),
+              StartsWith("b.toml:22: imu.R_BS: is not a rotation matrix"));
+}
+
+TEST(Board, WhatWasMeasuredReplacesTheConfigurationsAndIsLogged) {
+  Board board = parse_board(text_of(kBoards + "robotics_cape_mbbr.toml"), "b.toml");
+  board.measured.R_BS = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  board.measured.gyro_bias_B_rad_s = {0.1 + 0.2, -1e-17, 0.0};
+  board.measured.accel_scale_S = {1.01, 0.99, 1.0};
+  board.measured.accel_bias_B_m_s2 = {0.1, 0.2, 0.3};
   const Loaded<MbbrConfig> loaded =
-      load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", board.calibration);
-  Mat3 expected;
-  expected << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  EXPECT_EQ(loaded.config.calibration.R_BS, expected);
-  EXPECT_EQ(loaded.config.calibration.battery_V_per_count, 0.004835164835);
-  EXPECT_EQ(loaded.config.calibration.battery_offset_V, -0.10);
+      load_mbbr(kConfig, overrides_of(board, {"calibration.accel_bias_m_s2[2]=0.5"}));
+  const Calibration& c = loaded.config.calibration;
+  Mat3 turned;
+  turned << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  EXPECT_EQ(c.R_BS, turned);
+  EXPECT_EQ(c.gyro_bias_B_rad_s, Vec3(0.1 + 0.2, -1e-17, 0.0));
+  EXPECT_EQ(c.accel_scale_S, Vec3(1.01, 0.99, 1.0));
+  EXPECT_EQ(c.accel_bias_B_m_s2, Vec3(0.1, 0.2, 0.5));                          // --set has the last word
+  const Calibration again = parse_mbbr(loaded.toml, "log").config.calibration;  // as replay will
+  EXPECT_EQ(again.R_BS, c.R_BS);
+  EXPECT_EQ(again.gyro_bias_B_rad_s, c.gyro_bias_B_rad_s);
+  EXPECT_EQ(again.accel_bias_B_m_s2, c.accel_bias_B_m_s2);
 }
 
 TEST(Board, WrongKeysAreRefusedWithLineAndRange) {

@@ -48,10 +48,26 @@ missing_of() {
   done
 }
 
+# when_unlocked COMMAND...: runs it, and again for five minutes while another program holds a lock of dpkg or apt.
+# Output goes to stderr.
+when_unlocked() {
+  local output=$root/build/packages.log deadline=$((SECONDS + 300)) said=no
+  mkdir -p "$root/build"
+  until as_root env LC_ALL=C DEBIAN_FRONTEND=noninteractive "$@" 2>&1 | tee "$output" >&2; do
+    case $(<"$output") in
+    *"Could not get lock"* | *"Unable to acquire the dpkg frontend lock"* | *"lock was locked by another process"*) ;;
+    *) return 1 ;;
+    esac
+    [ "$SECONDS" -lt "$deadline" ] || return 1
+    [ "$said" = yes ] || say "another program is installing packages; waiting until it has finished (at most 5 minutes)"
+    said=yes
+    sleep 5
+  done
+}
+
 apt_get() {
   # Own architecture only: a foreign one, if configured, must not be able to fail our update.
-  as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -o APT::Architectures="$(dpkg --print-architecture)" \
-    -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300 "$@" >&2
+  when_unlocked apt-get -q -o APT::Architectures="$(dpkg --print-architecture)" -o Acquire::Retries=3 "$@"
 }
 
 # install_packages GROUP...: does not touch apt when nothing is missing, nor the network's package lists when the
@@ -65,7 +81,7 @@ install_packages() {
   [ "$(id -u)" -eq 0 ] || command -v sudo >/dev/null ||
     die "packages are missing and there is no sudo; as root: apt-get install ${missing[*]}"
   say "Installing ${#missing[@]} Debian packages: ${missing[*]}"
-  [ -z "$(dpkg --audit)" ] || as_root dpkg --configure -a >&2 # an earlier installation was interrupted
+  [ -z "$(dpkg --audit)" ] || when_unlocked dpkg --configure -a # an earlier installation was interrupted
   # The lists at hand may be absent (a dry run tells) or too old for what the mirror still has (only installing tells).
   if ! { apt_get install --simulate --no-install-recommends "${missing[@]}" >/dev/null 2>&1 &&
     apt_get install -y --no-install-recommends "${missing[@]}"; }; then
@@ -101,6 +117,12 @@ build() {
   local preset=$1 target arguments=()
   shift
   for target in "$@"; do arguments+=(--target "$target"); done
+  # A build folder that was copied along with its tree would build the other tree's sources.
+  local cache=$root/build/$preset/CMakeCache.txt
+  if [ -f "$cache" ] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$cache"; then
+    say "build/$preset was made for another folder; making it anew"
+    rm -rf "${root:?}/build/$preset"
+  fi
   # Once, and again when newly installed packages may have changed what CMake finds.
   local configured=$root/build/$preset/equipoise.configured
   if [ ! -f "$root/build/$preset/build.ninja" ] || [ ! -f "$configured" ] ||

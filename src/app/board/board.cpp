@@ -13,6 +13,8 @@ namespace {
 using config::Document;
 using config::Section;
 
+using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
 constexpr int kMaxLine = 31;  // a GPIO bank of the AM335x has 32 lines
 
 template <std::size_t N>
@@ -51,7 +53,7 @@ int read_one_of(Section& s, const std::string& key, const std::vector<int>& valu
   s.fail(key, std::to_string(value) + " is not possible; allowed: " + allowed);
 }
 
-bbb_imu_t read_imu(Section s) {
+bbb_imu_t read_imu(Section s, std::array<double, 9>* R_BS) {
   bbb_imu_t imu{};
   copy_text(s, "bus", imu.bus);
   imu.address = static_cast<std::uint16_t>(s.integer("address", 0x08, 0x77));
@@ -63,7 +65,7 @@ bbb_imu_t read_imu(Section s) {
   imu.interrupt = read_pin(s, "interrupt", s.boolean("interrupt_active_low"));
   imu.late_after_us = static_cast<std::uint32_t>(s.integer("late_after_us", 1, 5000));
   copy_text(s, "dmp_firmware", imu.dmp_firmware);
-  s.numbers("R_BS", 9, -1.0, 1.0);
+  Eigen::Map<RowMajor>(R_BS->data()) = s.rotation("R_BS");
   s.finish();
   return imu;
 }
@@ -87,12 +89,10 @@ bbb_motor_t read_motor(Section& s) {
 void read_battery(Section s, Board* board) {
   copy_text(s, "adc", board->wiring.adc);
   board->wiring.battery_channel = static_cast<std::uint32_t>(s.integer("channel", 0, 7));
-  board->battery_V_per_count = s.number("V_per_count", 1e-6, 1.0);
-  board->battery_offset_V = s.number("offset_V", -5.0, 5.0);
+  board->facts.battery_V_per_count = s.number("V_per_count", 1e-6, 1.0);
+  board->facts.battery_offset_V = s.number("offset_V", -5.0, 5.0);
   board->wiring.battery_every_ticks = static_cast<std::uint32_t>(s.integer("every_ticks", 1, 200));
   s.finish();
-  board->calibration.push_back("calibration.battery_V_per_count=" + toml_number(board->battery_V_per_count));
-  board->calibration.push_back("calibration.battery_offset_V=" + toml_number(board->battery_offset_V));
 }
 
 void read_panel(Section& root, Board* board) {
@@ -129,6 +129,7 @@ void read_panel(Section& root, Board* board) {
 Board read_board(const Document& document) {
   Section root(document, document.root(), "");
   Board board;
+  board.facts.file = document.path();
   Section about = root.table("board");
   board.robot = about.text("robot");
   constexpr std::array<const char*, 3> kOverlays{"cape", "blue", "none"};
@@ -138,19 +139,22 @@ Board read_board(const Document& document) {
   about.finish();
 
   Section imu = root.table("imu");
-  const std::vector<double> mount = imu.numbers("R_BS", 9, -1.0, 1.0);
-  std::copy(mount.begin(), mount.end(), board.R_BS.begin());
-  board.calibration.push_back("calibration.R_BS=" + toml_array(mount));
-  board.wiring.imu = read_imu(imu);
+  board.wiring.imu = read_imu(imu, &board.facts.R_BS);
 
   Section bridges = root.table("bridges");
   board.wiring.pwm_hz = static_cast<std::uint32_t>(bridges.integer("pwm_hz", 100, 100000));
   const bool active_low = bridges.boolean("enable_active_low");
   board.wiring.enable = read_pin(bridges, "enable", active_low);
+  board.facts.pwm_hz = board.wiring.pwm_hz;
   bridges.finish();
 
-  for (Section& motor : root.tables("motor", 1, RIO_MAX_MOTORS))
-    board.wiring.motor[board.wiring.motors++] = read_motor(motor);
+  for (Section& section : root.tables("motor", 1, RIO_MAX_MOTORS)) {
+    const bbb_motor_t motor = read_motor(section);
+    if (motor.bridge != (board.wiring.motors == 0 ? motor : board.wiring.motor[0]).bridge)
+      section.fail("bridge", "differs from the first motor's; all bridges are of one type");
+    board.wiring.motor[board.wiring.motors++] = motor;
+  }
+  board.facts.bridge = board.wiring.motor[0].bridge == BBB_MC33926 ? "drive_coast" : "drive_brake";
   read_battery(root.table("battery"), &board);
   read_panel(root, &board);
   root.finish();
@@ -166,16 +170,21 @@ Board load_board(const std::string& path) {
   if (board.calibration_file.empty()) return board;
   const auto file = std::filesystem::path(path).parent_path() / board.calibration_file;
   const CalibrationFile calibration = load_calibration(file.string(), board.robot);
-  for (const std::string& line : overrides_of(calibration, board.R_BS)) board.calibration.push_back(line);
-  board.gyro_calibrated = calibration.gyro.has_value();
-  board.accel_calibrated = calibration.accel.has_value();
+  board.measured = measured_of(calibration, board.facts.R_BS);
   return board;
+}
+
+Overrides overrides_of(const Board& board, std::vector<std::string> set) {
+  Overrides overrides(std::move(set));
+  overrides.board = board.facts;
+  overrides.measured = board.measured;
+  return overrides;
 }
 
 std::string missing_calibration(const Board& board) {
   std::string missing;
-  if (!board.gyro_calibrated) missing += "gyro";
-  if (!board.accel_calibrated) missing += missing.empty() ? "accelerometer" : ", accelerometer";
+  if (!board.measured.gyro_bias_B_rad_s) missing += "gyro";
+  if (!board.measured.accel_bias_B_m_s2) missing += missing.empty() ? "accelerometer" : ", accelerometer";
   if (missing.empty()) return "";
   return missing + " not calibrated" +
          (board.calibration_file.empty() ? "; the board names no calibration file" : "");

@@ -2,11 +2,11 @@
 // In: path -> out: Board; ConfigError (file:line: key: reason and what is allowed) otherwise. Start-up only.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
 #include "bbb_config.h"
+#include "equipoise/overrides.hpp"
 
 namespace equipoise::app {
 
@@ -23,21 +23,18 @@ struct Board {
   std::vector<BoardLine> led_bars;
   BoardLine button_pause, button_mode;
   bool buttons_active_low = true;
-  double battery_V_per_count = 0.0;
-  double battery_offset_V = 0.0;
   int dc_jack_channel = 0;
   std::string serial_device;  // address or path
   int serial_baud = 0;
   std::string can_interface;  // address or name; empty: no CAN
   int can_bitrate = 0;
-  std::array<double, 9> R_BS{};  // rows
   std::string calibration_file;  // of equipoise calibrate, beside the board file; empty: none
-  /// --set overrides: the board's mount rotation and battery scale instead of the configuration's, and what
-  /// its calibration file says.
-  std::vector<std::string> calibration;
-  bool gyro_calibrated = false;  // by that file
-  bool accel_calibrated = false;
+  BoardFacts facts;              // which the configuration must share
+  MeasuredCalibration measured;  // what the calibration file says
 };
+
+/// For a configuration that is to run on this board.
+Overrides overrides_of(const Board& board, std::vector<std::string> set = {});
 
 /// What a robot that balances needs and this board's calibration file does not say; empty: nothing.
 std::string missing_calibration(const Board& board);

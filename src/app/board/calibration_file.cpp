@@ -56,8 +56,7 @@ CalibrationFile read(const Document& document) {
   if (root.has("mount")) {
     Section s = root.table("mount");
     const CalibrationFile::Stamp stamp = read_stamp(s);
-    const std::vector<double> rows = s.numbers("R_BS", 9, -1.0, 1.0);
-    file.mount = {stamp, Eigen::Map<const RowMajor>(rows.data())};
+    file.mount = {stamp, s.rotation("R_BS")};
     s.finish();
   }
   if (root.has("motors")) {
@@ -73,6 +72,19 @@ CalibrationFile read(const Document& document) {
   }
   root.finish();
   return file;
+}
+
+/// Round trip exact; a TOML float needs a point or an exponent.
+std::string toml_number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return std::strpbrk(text, ".en") != nullptr ? text : std::string(text) + ".0";
+}
+
+std::string toml_array(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "[" : ", ") + toml_number(value);
+  return text + "]";
 }
 
 template <class Container>
@@ -93,18 +105,6 @@ std::string indices_of(const std::vector<int>& values) {
 }
 
 }  // namespace
-
-std::string toml_number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return std::strpbrk(text, ".en") != nullptr ? text : std::string(text) + ".0";
-}
-
-std::string toml_array(const std::vector<double>& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "[" : ", ") + toml_number(value);
-  return text + "]";
-}
 
 CalibrationFile::Stamp stamp_of(double temperature_degC) {
   CalibrationFile::Stamp stamp;
@@ -180,23 +180,21 @@ void save_calibration(const CalibrationFile& file, const std::string& path) {
   write_whole(to_toml(file), path);
 }
 
-std::vector<std::string> overrides_of(const CalibrationFile& file, const std::array<double, 9>& board_R_BS) {
+MeasuredCalibration measured_of(const CalibrationFile& file, const std::array<double, 9>& board_R_BS) {
   const Mat3 board = Eigen::Map<const RowMajor>(board_R_BS.data());
   const Mat3 R_BS = file.mount ? file.mount->R_BS : board;
-  std::vector<std::string> overrides;
-  const auto set = [&overrides](const std::string& key, const std::string& value) {
-    overrides.push_back("calibration." + key + "=" + value);
-  };
+  const auto array = [](const Vec3& v) { return std::array<double, 3>{v.x(), v.y(), v.z()}; };
+  MeasuredCalibration measured;
   if (file.mount) {
-    const RowMajor rows = R_BS;
-    set("R_BS", array_of(rows));
+    measured.R_BS.emplace();
+    Eigen::Map<RowMajor>(measured.R_BS->data()) = R_BS;
   }
-  if (file.gyro) set("gyro_bias_rad_s", array_of(Vec3(R_BS * file.gyro->bias_rad_s)));
+  if (file.gyro) measured.gyro_bias_B_rad_s = array(R_BS * file.gyro->bias_rad_s);
   if (file.accel) {
-    set("accel_scale", array_of(file.accel->scale));
-    set("accel_bias_m_s2", array_of(Vec3(R_BS * file.accel->bias_m_s2)));
+    measured.accel_scale_S = array(file.accel->scale);
+    measured.accel_bias_B_m_s2 = array(R_BS * file.accel->bias_m_s2);
   }
-  return overrides;
+  return measured;
 }
 
 }  // namespace equipoise::app

@@ -1,7 +1,7 @@
 // A calibration file: what equipoise calibrate found, per kind with its date and the chip's temperature, in
 // sensor axes so that it outlives a turned board. A board file names it: [board] calibration = "FILE".
-// In: path -> out: values, or --set overrides of a configuration; ConfigError names file and key. Start-up
-// only.
+// In: path -> out: values, or what of them replaces a configuration's; ConfigError names file and key.
+// Start-up only.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "equipoise/overrides.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise::app {
@@ -58,14 +59,11 @@ std::string to_toml(const CalibrationFile& file);
 void save_calibration(const CalibrationFile& file, const std::string& path);
 
 /// For a robot whose board file says R_BS (rows); the file's own mount has precedence.
-std::vector<std::string> overrides_of(const CalibrationFile& file, const std::array<double, 9>& R_BS);
+MeasuredCalibration measured_of(const CalibrationFile& file, const std::array<double, 9>& R_BS);
 
 /// Now, and the temperature where the IMU tells it (not 0).
 CalibrationFile::Stamp stamp_of(double temperature_degC);
 
-/// Round trip exact; a TOML float needs a point or an exponent.
-std::string toml_number(double value);
-std::string toml_array(const std::vector<double>& values);
 /// As save_calibration; InputError when it cannot be written.
 void write_whole(const std::string& text, const std::string& path);
 

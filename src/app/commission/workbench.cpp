@@ -66,7 +66,7 @@ Workbench::Workbench(const WorkbenchArguments& a)
   }
   with_robot(robot_, a.config, [&](auto firmware) {
     using Firmware = decltype(firmware);
-    const auto config = Firmware::load(a.config, board_.calibration).config;
+    const auto config = Firmware::load(a.config, overrides_of(board_)).config;
     setup_.layout = layout_of(config.robot, config.motor, config.calibration);
     setup_.tip_axis_B = tip_axis(config.robot);
     setup_.motor = config.motor;

@@ -160,7 +160,7 @@ void examine_adc(const Patient& patient, Findings* findings) {
     return;
   }
   const double volts =
-      patient.board->battery_V_per_count * static_cast<double>(counts) + patient.board->battery_offset_V;
+      patient.board->facts.battery_V_per_count * static_cast<double>(counts) + patient.board->facts.battery_offset_V;
   char text[64];
   std::snprintf(text, sizeof text, "%.2f V (%lld counts)", volts, static_cast<long long>(counts));
   constexpr double kTwoCells_V = 6.4;  // 3.2 V per LiPo cell: as good as empty

@@ -45,7 +45,7 @@ struct MbbrFirmware {
   static constexpr const char* kSpeedUnit = "cm/s";
   static constexpr double kSpeedScale = 100.0;
 
-  static Loaded load(const std::string& path, const std::vector<std::string>& overrides) {
+  static Loaded load(const std::string& path, const Overrides& overrides) {
     return load_mbbr(path, overrides);
   }
   static Loaded parse(const std::string& text, const std::string& origin) { return parse_mbbr(text, origin); }
@@ -90,7 +90,7 @@ struct MipFirmware {
   static constexpr const char* kSpeedUnit = "rad/s";
   static constexpr double kSpeedScale = 1.0;
 
-  static Loaded load(const std::string& path, const std::vector<std::string>& overrides) {
+  static Loaded load(const std::string& path, const Overrides& overrides) {
     return load_mip(path, overrides);
   }
   static Loaded parse(const std::string& text, const std::string& origin) { return parse_mip(text, origin); }

@@ -64,8 +64,7 @@ int run_lockstep(const RunArguments& a) {
 
 template <class Firmware>
 int run_board(const RunArguments& a, const Board& board, const std::string& board_toml) {
-  std::vector<std::string> overrides = board.calibration;
-  overrides.insert(overrides.end(), a.set.begin(), a.set.end());
+  const Overrides overrides = overrides_of(board, a.set);
   // Before the receiver's thread, and before the board is opened.
   RealtimeSession session(a.session, missing_calibration(board));
   Runner<Firmware> runner(a, overrides, board_toml);

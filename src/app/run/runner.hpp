@@ -43,7 +43,7 @@ inline std::string numbered(const std::string& path, int trial) {
 template <class Firmware>
 class Runner {
  public:
-  Runner(const RunArguments& a, const std::vector<std::string>& overrides, const std::string& board_toml)
+  Runner(const RunArguments& a, const Overrides& overrides, const std::string& board_toml)
       : a_(a),
         loaded_(Firmware::load(a.config, overrides)),
         config_(Firmware::apply(loaded_.config, a.choice)),

@@ -168,7 +168,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
 
 }  // namespace
 
-Loaded<MbbrConfig> load_mbbr(const std::string& path, const std::vector<std::string>& overrides) {
+Loaded<MbbrConfig> load_mbbr(const std::string& path, const Overrides& overrides) {
   return read_mbbr(Document(path, overrides));
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
+#include "equipoise/overrides.hpp"
 #include "equipoise/pipeline.hpp"
 #include "robots/mbbr/estimators.hpp"
 #include "robots/mbbr/reference.hpp"
@@ -37,7 +38,7 @@ struct MbbrConfig {
   MbbrScheduledPipeline::Params scheduled_pipeline() const;
 };
 
-Loaded<MbbrConfig> load_mbbr(const std::string& path, const std::vector<std::string>& overrides);
+Loaded<MbbrConfig> load_mbbr(const std::string& path, const Overrides& overrides);
 /// From text, e.g. of a log; `origin` names it in errors.
 Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin);
 

@@ -137,7 +137,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
 
 }  // namespace
 
-Loaded<MipConfig> load_mip(const std::string& path, const std::vector<std::string>& overrides) {
+Loaded<MipConfig> load_mip(const std::string& path, const Overrides& overrides) {
   return read_mip(Document(path, overrides));
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
+#include "equipoise/overrides.hpp"
 #include "equipoise/pipeline.hpp"
 #include "robots/mip/estimators.hpp"
 #include "robots/mip/lqr_feedback.hpp"
@@ -37,7 +38,7 @@ struct MipConfig {
   MipLqrPipeline::Params lqr_pipeline() const;
 };
 
-Loaded<MipConfig> load_mip(const std::string& path, const std::vector<std::string>& overrides);
+Loaded<MipConfig> load_mip(const std::string& path, const Overrides& overrides);
 /// From text, e.g. of a log; `origin` names it in errors.
 Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin);
 

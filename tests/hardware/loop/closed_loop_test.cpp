@@ -58,7 +58,7 @@ class ClosedLoop : public ::testing::Test {
   void SetUp() override {
     becomeTheWorld();
     const app::Board board = app::load_board(kBoard);
-    world_.emplace(bench_, board, load_mbbr(kConfig, board.calibration).config, 1);
+    world_.emplace(bench_, board, load_mbbr(kConfig, app::overrides_of(board)).config, 1);
     const auto here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
     const std::string program = here / "../../equipoise";
     child_ = fork();

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -90,6 +91,75 @@ TEST(Config, OverridesApplyAndAreChecked) {
   EXPECT_THAT(error_of(kMbbr, {"friction.compensatio=0.8"}), HasSubstr("no such key"));
   EXPECT_THAT(error_of(kMbbr, {"friction.compensation=9"}), HasSubstr("allowed: 0 to 1.5"));
   EXPECT_THAT(error_of(kMbbr, {"friction"}), HasSubstr("expected key=value"));
+}
+
+TEST(Config, AnOverrideOfATableSetsItsKeysAndNoOthers) {
+  const MbbrConfig config = load_mbbr(kMbbr, {"safety={max_tilt_rad=0.5, max_stall_s = 2.0}"}).config;
+  EXPECT_EQ(config.safety.max_tilt_rad, 0.5);
+  EXPECT_EQ(config.safety.max_stall_s, 2.0);
+  EXPECT_EQ(config.safety.max_slip_rad_s, load_mbbr(kMbbr, {}).config.safety.max_slip_rad_s);
+  EXPECT_THAT(error_of(kMbbr, {"safety={}"}), HasSubstr("--set safety={}: sets nothing"));
+  EXPECT_THAT(error_of(kMbbr, {"safety=3"}), HasSubstr("is a table; set one of its keys"));
+  EXPECT_THAT(error_of(kMbbr, {"safety={max_tilt=0.5}"}), HasSubstr("no such key"));
+}
+
+TEST(Config, AnOverrideReachesAnElementOfAnArray) {
+  const auto before = load_mbbr(kMbbr, {}).config;
+  const auto after = load_mbbr(kMbbr, {"controller.thesis.gains[2].c1=9.25"}).config;
+  ASSERT_GT(after.thesis.schedule.rows, 3U);
+  EXPECT_EQ(after.thesis.schedule.row[2][0], 9.25);
+  EXPECT_EQ(after.thesis.schedule.row[2][1], before.thesis.schedule.row[2][1]);
+  EXPECT_EQ(after.thesis.schedule.row[1][0], before.thesis.schedule.row[1][0]);
+  EXPECT_EQ(load_mbbr(kMbbr, {"calibration.gyro_bias_rad_s[1]=0.25"}).config.calibration.gyro_bias_B_rad_s,
+            Vec3(0.0, 0.25, 0.0));
+  EXPECT_THAT(error_of(kMbbr, {"calibration.gyro_bias_rad_s[3]=0.25"}),
+              HasSubstr("gyro_bias_rad_s has 3 elements, from [0] to [2]"));
+  EXPECT_THAT(error_of(kMbbr, {"controller.thesis.gains[0].c9=1.0"}), HasSubstr("no such key"));
+  EXPECT_THAT(error_of(kMbbr, {"friction.compensation[0]=1.0"}), HasSubstr("compensation is no array"));
+  for (const char* index : {"[", "[]", "[-1]", "[1", "[1]2", "[1][0]", "[99999999999999999999]", "[0x1]"}) {
+    EXPECT_THAT(error_of(kMbbr, {"calibration.gyro_bias_rad_s" + std::string(index) + "=0.1"}),
+                HasSubstr("--set calibration.gyro_bias_rad_s["))
+        << index;
+  }
+}
+
+TEST(Config, WhatNoOverrideCanBeIsRefusedInOneShortLine) {
+  std::string deep = "a";
+  while (deep.size() < 100000) deep += ".a";
+  const std::vector<std::string> texts{deep + "=1",
+                                       "motor=" + deep,
+                                       "motor={" + deep + "=1}",
+                                       "=1",
+                                       ".=1",
+                                       "..=1",
+                                       "motor.=1",
+                                       "friction.compensation=0.8\nmotor=1",
+                                       std::string("a\0b=1", 6)};
+  for (const std::string& text : texts) {
+    const std::string error = error_of(kMbbr, {text});
+    EXPECT_FALSE(error.empty()) << text.substr(0, 40);
+    EXPECT_LT(error.size(), 400U);
+  }
+}
+
+TEST(Config, AFileThatIsNestedTooDeepIsRefusedWithItsLine) {
+  std::string deep = "a";
+  while (deep.size() < 100000) deep += ".a";
+  const EditedConfig key("[robot]", deep + "=1\n[robot]");
+  EXPECT_EQ(error_of(key.path()), key.where() + " more than 100 dots in a line");
+  const EditedConfig table("[robot]", "[" + deep + "]\n[robot]");
+  EXPECT_EQ(error_of(table.path()), table.where() + " more than 100 dots in a line");
+  const EditedConfig comment("[robot]", "# " + std::string(1000, '.') + "\n[robot]");
+  EXPECT_EQ(error_of(comment.path()), "");
+}
+
+TEST(Config, APipeOrAFolderIsRefusedAtOnce) {
+  const std::string pipe = testing::TempDir() + "pipe_" + std::to_string(::getpid());
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(error_of(pipe), pipe + ": is no regular file");
+  EXPECT_THAT(error_of(kMbbr, {"include=[\"" + pipe + "\"]"}), HasSubstr(pipe + ": is no regular file"));
+  std::filesystem::remove(pipe);
+  EXPECT_THAT(error_of(testing::TempDir()), HasSubstr("is no regular file"));
 }
 
 TEST(Config, FragmentsReplaceValuesAndOverridesHaveTheLastWord) {

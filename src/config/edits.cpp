@@ -1,0 +1,268 @@
+#include "config/edits.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "equipoise/config.hpp"
+
+namespace equipoise::config {
+namespace {
+
+// A dot is a level of tables, which are read and freed by recursion; no file of ours has ten in a line.
+constexpr int kMostDotsInALine = 100;
+constexpr std::size_t kLongestKey = 200;
+
+void refuse_deep_nesting(const std::string& text, const std::string& origin) {
+  int line = 1;
+  int dots = 0;
+  char quote = '\0';
+  bool comment = false;
+  for (const char c : text) {
+    if (c == '\n') {
+      ++line;
+      dots = 0;
+      quote = '\0';
+      comment = false;
+    } else if (comment) {
+      continue;
+    } else if (quote != '\0') {
+      if (c == quote) quote = '\0';
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '#') {
+      comment = true;
+    } else if (c == '.' && ++dots > kMostDotsInALine) {
+      throw ConfigError(origin + ":" + std::to_string(line) + ": more than " +
+                        std::to_string(kMostDotsInALine) + " dots in a line");
+    }
+  }
+}
+
+/// Replaces values of `root` by those of a fragment.
+void merge(toml::table& root, toml::table&& fragment, const std::string& path, const std::string& where) {
+  for (auto&& entry : fragment) {
+    const toml::key& key = entry.first;
+    toml::node& value = entry.second;
+    const std::string name = where.empty() ? std::string(key.str()) : where + "." + std::string(key.str());
+    if (!root.contains(key)) {
+      throw ConfigError(at(path, value.source()) + ": " + name + ": no such key in the configuration");
+    }
+    if (value.is_table() && root.get(key)->is_table()) {
+      merge(*root.get_as<toml::table>(key.str()), std::move(*value.as_table()), path, name);
+    } else {  // moved nodes remember where they stood
+      value.visit([&](auto& v) { root.insert_or_assign(key, std::move(v)); });
+    }
+  }
+}
+
+/// One edit of --set, with its errors.
+class SetText {
+ public:
+  explicit SetText(const std::string& text) : text_(text) {}
+
+  [[noreturn]] void fail(const std::string& what) const {
+    constexpr std::size_t kShown = 120;
+    throw ConfigError("--set " + (text_.size() > kShown ? text_.substr(0, kShown) + "..." : text_) + ": " +
+                      what);
+  }
+
+  void apply(toml::table& root) const {
+    const std::size_t equals = text_.find('=');
+    if (equals == std::string::npos || equals == 0)
+      fail("expected key=value, e.g. --set friction.compensation=0.8");
+    if (equals > kLongestKey) fail("no key is as long");
+    toml::table value = parsed_value(text_.substr(equals + 1));
+    toml::node* at = &root;
+    std::size_t begin = 0;
+    const std::string path = text_.substr(0, equals);
+    for (bool last = false; !last;) {
+      std::size_t end = path.find('.', begin);
+      last = end == std::string::npos;
+      if (last) end = path.size();
+      at = step(at, path.substr(begin, end - begin), last ? &value : nullptr);
+      begin = end + 1;
+    }
+  }
+
+ private:
+  /// {value = ...}; a bare word is a string.
+  toml::table parsed_value(const std::string& value) const {
+    if (value.find('\n') != std::string::npos) fail("a value is one line");
+    try {
+      return parsed_text("value = " + value, "");
+    } catch (const ConfigError&) {
+      try {
+        return parsed_text("value = \"" + value + "\"", "");
+      } catch (const ConfigError& error) {
+        fail(error.what());
+      }
+    }
+  }
+
+  /// Along one part of the key, name[2][0]; the last part takes the value.
+  toml::node* step(toml::node* node, const std::string& part, toml::table* value) const {
+    const std::size_t bracket = std::min(part.find('['), part.size());
+    const std::string name = trimmed(part.substr(0, bracket));
+    toml::table* table = node->as_table();
+    toml::node* found = table == nullptr ? nullptr : table->get(name);
+    const bool new_include = name == "include" && value != nullptr && bracket == part.size();
+    if (table == nullptr || (found == nullptr && !new_include)) fail("no such key in the configuration");
+    if (bracket == part.size()) {
+      if (value != nullptr) put(value, found, [&](auto& v) { table->insert_or_assign(name, std::move(v)); });
+      return found;
+    }
+    for (std::size_t open = bracket; open < part.size();) {
+      const std::size_t close = part.find(']', open);
+      const std::string index = part.substr(open + 1, close == std::string::npos ? close : close - open - 1);
+      toml::array* array = found->as_array();
+      if (array == nullptr) fail(name + " is no array");
+      if (part[open] != '[' || close == std::string::npos || index.empty() || index.size() > 6 ||
+          index.find_first_not_of("0123456789") != std::string::npos)
+        fail("expected an index such as " + name + "[0]");
+      const std::size_t i = std::stoul(index);
+      if (i >= array->size())
+        fail(name + " has " + std::to_string(array->size()) + " elements, from [0] to [" +
+             std::to_string(array->size() - 1) + "]");
+      found = array->get(i);
+      open = close + 1;
+      if (open == part.size() && value != nullptr)
+        put(value, found,
+            [&](auto& v) { array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(i), std::move(v)); });
+    }
+    return found;
+  }
+
+  /// A table's keys go into the table that stands there; anything else replaces.
+  template <class Replace>
+  void put(toml::table* holder, toml::node* present, Replace&& replace) const {
+    toml::node& value = *holder->get("value");
+    if (present == nullptr || !present->is_table()) {
+      value.visit([&](auto& v) { replace(v); });
+      return;
+    }
+    if (!value.is_table()) fail("is a table; set one of its keys");
+    if (value.as_table()->empty()) fail("sets nothing; name a key of the table");
+    try {
+      merge(*present->as_table(), std::move(*value.as_table()), "", "");
+    } catch (const ConfigError&) {
+      fail("no such key in the configuration");
+    }
+  }
+
+  static std::string trimmed(const std::string& text) {
+    const std::size_t first = text.find_first_not_of(" \t");
+    if (first == std::string::npos) return "";
+    return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+  }
+
+  const std::string& text_;
+};
+
+template <std::size_t N>
+void put_numbers(toml::table& calibration, const char* key,
+                 const std::optional<std::array<double, N>>& values) {
+  if (!values) return;
+  toml::array array;
+  for (const double value : *values) array.push_back(value);
+  calibration.insert_or_assign(key, std::move(array));
+}
+
+/// Shortest text that shows the difference.
+std::string shown(double value) {
+  std::ostringstream text;
+  text.precision(10);
+  text << value;
+  return text.str();
+}
+
+bool differs(double a, double b) { return !(std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b))); }
+
+}  // namespace
+
+std::string at(const std::string& path, const toml::source_region& where) {
+  if (where.begin.line == 0) return path;
+  return (where.path ? *where.path : path) + ":" + std::to_string(where.begin.line);
+}
+
+toml::table parsed_text(const std::string& text, const std::string& origin) {
+  refuse_deep_nesting(text, origin);
+  try {
+    return toml::parse(text, origin);
+  } catch (const toml::parse_error& error) {
+    const std::string where = origin.empty() ? "" : at(origin, error.source()) + ": ";
+    throw ConfigError(where + std::string(error.description()));
+  }
+}
+
+toml::table parsed_file(const std::string& path, const std::string& hint) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    throw ConfigError(path + ": is no regular file");
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (!file || (file.peek() != std::ifstream::traits_type::eof() && !(text << file.rdbuf())))
+    throw ConfigError(path + ": cannot be opened" + hint);
+  return parsed_text(text.str(), path);
+}
+
+void apply_includes(toml::table& root, const std::string& path) {
+  const toml::node* include = root.get("include");
+  if (include == nullptr) return;
+  const toml::array* files = include->as_array();
+  if (files == nullptr || (!files->empty() && !files->is_homogeneous<std::string>())) {
+    throw ConfigError(path + ": include: expected an array of file names, e.g. include = [\"motor.toml\"]");
+  }
+  const std::string folder = path.substr(0, path.rfind('/') + 1);
+  std::vector<std::string> names;
+  for (const toml::node& node : *files) names.push_back(node.as_string()->get());
+  root.erase("include");
+  for (const std::string& name : names) {
+    const std::string fragment = name.rfind('/', 0) == 0 ? name : folder + name;
+    try {
+      merge(root, parsed_file(fragment, ""), fragment, "");
+    } catch (const ConfigError& error) {
+      const bool of_the_file = std::string(error.what()).rfind(fragment + ": ", 0) == 0;
+      throw ConfigError((of_the_file ? path + ": include: " : "") + error.what());
+    }
+  }
+}
+
+void check_board(const toml::table& root, const std::string& path, const BoardFacts& board) {
+  const auto complain = [&](const std::string& key, const std::string& board_value,
+                            const std::string& ours_key, const toml::node& ours, const std::string& value) {
+    throw ConfigError(board.file + ": " + key + ": " + board_value + " where " + at(path, ours.source()) +
+                      " has " + ours_key + " = " + value + "; both must say the same");
+  };
+  const auto number = [&](const std::string& key, double theirs, const std::string& ours_key) {
+    const toml::node* node = toml::at_path(root, ours_key).node();
+    const auto ours = node == nullptr ? std::nullopt : node->value<double>();
+    if (ours && differs(theirs, *ours)) complain(key, shown(theirs), ours_key, *node, shown(*ours));
+  };
+  number("bridges.pwm_hz", board.pwm_hz, "motor.pwm_hz");
+  number("battery.V_per_count", board.battery_V_per_count, "calibration.battery_V_per_count");
+  number("battery.offset_V", board.battery_offset_V, "calibration.battery_offset_V");
+  for (std::size_t i = 0; i < board.R_BS.size(); ++i) {
+    const std::string index = "[" + std::to_string(i) + "]";
+    number("imu.R_BS" + index, board.R_BS[i], "calibration.R_BS" + index);
+  }
+  const toml::node* bridge = toml::at_path(root, "motor.bridge").node();
+  const auto ours = bridge == nullptr ? std::nullopt : bridge->value<std::string>();
+  if (ours && *ours != board.bridge)
+    complain("motor.bridge", "wired as " + board.bridge, "motor.bridge", *bridge, *ours);
+}
+
+void apply_measured(toml::table& root, const MeasuredCalibration& measured) {
+  toml::table* calibration = root["calibration"].as_table();
+  if (calibration == nullptr) return;  // reading it will say so
+  put_numbers(*calibration, "R_BS", measured.R_BS);
+  put_numbers(*calibration, "gyro_bias_rad_s", measured.gyro_bias_B_rad_s);
+  put_numbers(*calibration, "accel_scale", measured.accel_scale_S);
+  put_numbers(*calibration, "accel_bias_m_s2", measured.accel_bias_B_m_s2);
+}
+
+void apply_set(toml::table& root, const std::string& text) { SetText(text).apply(root); }
+
+}  // namespace equipoise::config
