@@ -92,6 +92,16 @@ SafetyParams read_safety(Section s) {
   return p;
 }
 
+Chain read_chain(Section s) {
+  Chain c;
+  c.gyro_delay_s = s.number("gyro_delay_s", 0.0, 0.02);
+  c.accel_delay_s = s.number("accel_delay_s", 0.0, 0.02);
+  c.attitude_delay_s = s.number("attitude_delay_s", 0.0, 0.02);
+  c.actuation_delay_s = s.number("actuation_delay_s", 0.0, 0.999 * kTickS);
+  s.finish();
+  return c;
+}
+
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m) {
   AttitudeFilterParams p;
   p.own = s.choice("source", {"packets", "own"}) == 1;

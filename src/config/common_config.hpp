@@ -7,6 +7,7 @@
 #include "config/toml_reader.hpp"
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/actuate/safety.hpp"
+#include "equipoise/control/chain.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/sense/attitude_filter.hpp"
@@ -26,6 +27,7 @@ std::string world_key(const Section& worlds, const std::string& fidelity);
 MotorParameters read_motor(Section s);
 Calibration read_calibration(Section s, int wheels);
 SafetyParams read_safety(Section s);
+Chain read_chain(Section s);
 /// Of our own filter; `imu_position_m`: lever arm.
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m);
 /// What of a world only one robot has.

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 import sympy as sp
-from derive import emit, generate, mbbr, mbbr_gains, mbbr_header, mip, mip_gains, mip_header
+from derive import emit, generate, mbbr, mbbr_header, mip, mip_header
 
 
 def test_committed_headers_are_current(root):
@@ -100,37 +100,6 @@ def test_mbbr_model_computes_the_derived_rows_and_their_jacobians(root, tmp_path
 def test_mip_model_computes_the_derived_rows_and_their_jacobians(root, tmp_path):
     parameters = mip.TABLE_3_2 | {"lateral": 0.8, "l_ay": 0.01, "l_az": 0.03}
     check_functions(root, tmp_path, mip, mip_header.model(), parameters, [0.03, 0.4, 6.0, 8.0], [0.6, -0.3])
-
-
-def test_mbbr_gains_compile(root, tmp_path):
-    program = """
-#include <cstdio>
-#include "generated/mbbr_gains.hpp"
-using namespace equipoise::generated::mbbr;
-static_assert(kScheduled.size() == kRows && kScheduled[0].yaw_rate_rad_s == 0.0);
-int main() { for (const Row& row : kScheduled) std::printf("%.17g %.17g\\n", row.theta.re, row.theta.im); }
-"""
-    printed = compile_and_run(root, tmp_path, program)
-    designed = [[row.gains[0].real, row.gains[0].imag] for row in mbbr_gains.design().rows]
-    assert np.array(printed) == pytest.approx(np.array(designed), rel=1e-7, abs=1e-9)
-
-
-def test_mip_gains_compile(root, tmp_path):
-    program = """
-#include <cstdio>
-#include <initializer_list>
-#include "generated/mip_gains.hpp"
-using namespace equipoise::generated::mip;
-int main() {
-  for (const Slc* s : {&kSlc, &kSlcPublished})
-    for (const SecondOrder& d : {s->D1, s->D2}) std::printf("%.17g %.17g %.17g ", d.b0, d.b1, d.b2);
-  std::printf("%.17g %.17g %.17g %.17g\\n", kLqr.theta, kLqr.phi, kLqr.theta_dot, kLqr.phi_dot);
-}
-"""
-    (printed,) = compile_and_run(root, tmp_path, program)
-    slcs = (mip_gains.slc_design(), mip_gains.PUBLISHED)
-    numerators = [v for slc in slcs for tf in (slc.D1, slc.D2) for v in tf[0]]
-    assert printed == pytest.approx([*numerators, *mip_gains.lqr_gains()], rel=1e-7)
 
 
 def test_words_do_not_make_a_header_stale():

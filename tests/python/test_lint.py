@@ -112,7 +112,7 @@ def test_law_keeps_the_operating_system_out_of_core(tmp_path, name, header):
         "equipoise/types.hpp",
         "equipoise/samples.hpp",
         "robots/mbbr/mbbr.hpp",
-        "generated/mbbr_gains.hpp",
+        "generated/mbbr_model.hpp",
         "equipoise/estimate/joseph.hpp",
     ],
 )

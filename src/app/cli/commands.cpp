@@ -12,6 +12,7 @@ void add_commands(Subcommand app) {
   add_model(app);
   add_bridge(app);
   add_geometry(app);
+  add_design(app);
   add_attitude(app);
   add_motor_bench(app);
   add_friction_rig(app);

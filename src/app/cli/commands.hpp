@@ -18,6 +18,7 @@ void add_replay(Subcommand app);
 void add_model(Subcommand app);
 void add_bridge(Subcommand app);
 void add_geometry(Subcommand app);
+void add_design(Subcommand app);
 void add_attitude(Subcommand app);
 void add_motor_bench(Subcommand app);
 void add_friction_rig(Subcommand app);

@@ -98,6 +98,29 @@ MbbrEkf::Params read_ekf(Section s) {
   return p;
 }
 
+MbbrDesignParams read_design(Section s) {
+  constexpr double kMin = 1e-6;
+  constexpr double kMax = 1e6;
+  MbbrDesignParams d;
+  d.theta_rad = s.number("theta_rad", kMin, kMax);
+  d.phi_rad = s.number("phi_rad", kMin, kMax);
+  d.body_rate_rad_s = s.number("body_rate_rad_s", kMin, kMax);
+  d.phi_dot_rad_s = s.number("phi_dot_rad_s", kMin, kMax);
+  d.u = s.number("u", kMin, kMax);
+  d.theta_z_rad = s.number("theta_z_rad", kMin, kMax);
+  d.theta_z_dot_rad_s = s.number("theta_z_dot_rad_s", kMin, kMax);
+  d.u_z = s.number("u_z", kMin, kMax);
+  d.input_delay_s = s.number("input_delay_s", 0.0, kTickS);
+  d.step_hz = s.number("step_hz", 0.01, 10.0);
+  d.last_hz = s.number("last_hz", 0.0, 20.0);
+  const double rows = d.last_hz / d.step_hz + 1.0;
+  if (rows > static_cast<double>(MbbrGains{}.schedule.at.size())) {
+    s.fail("step_hz", "last_hz / step_hz + 1 rows are too many; allowed: 16");
+  }
+  s.finish();
+  return d;
+}
+
 void read_disturbance(Section& s, MbbrWorldParams* w) {
   w->coulomb_scale = s.number("coulomb_scale", 0.0, 10.0);
   w->extra_viscous_N_m_s = s.number("extra_viscous_N_m_s", 0.0, 1.0);
@@ -149,10 +172,14 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   c.thesis = read_thesis(controller.table("thesis"));
   Section scheduled = controller.table("scheduled");
   c.scheduled.yaw_feedforward = scheduled.boolean("yaw_feedforward");
+  c.design = read_design(scheduled.table("design"));
+  c.scheduled.gains = design_mbbr(c.robot, c.design);
   scheduled.finish();
   controller.finish();
   c.safety = config::read_safety(root.table("safety"));
   c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
+
+  c.chain = config::read_chain(root.table("chain"));
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
+#include "equipoise/control/chain.hpp"
 #include "equipoise/overrides.hpp"
 #include "equipoise/pipeline.hpp"
 #include "robots/mbbr/estimators.hpp"
@@ -28,9 +29,11 @@ struct MbbrConfig {
   MbbrEstimatorParams estimators;
   MbbrReferenceParams reference;
   MbbrThesisFeedbackParams thesis;
+  MbbrDesignParams design;
   MbbrScheduledFeedbackParams scheduled;
   SafetyParams safety;
   AttitudeFilterParams attitude;
+  Chain chain;
   std::array<MbbrWorldParams, 4> world;      // by Fidelity
   std::array<BridgeType, 4> world_bridge{};  // what the simulated robot is built with
 

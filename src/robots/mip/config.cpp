@@ -83,6 +83,44 @@ void read_limits(Section& s, Params& p) {
   p.soft_start_s = s.number("soft_start_s", 0.0, 5.0);
 }
 
+constexpr double kMinWeight = 1e-6;
+constexpr double kMaxWeight = 1e6;
+
+MipSlcDesign read_slc_design(Section s) {
+  MipSlcDesign d;
+  d.gain_U = s.number("gain_U", kMinWeight, kMaxWeight);
+  d.integral_p = s.number("integral_p", kMinWeight, kMaxWeight);
+  d.lead_q = s.number("lead_q", kMinWeight, kMaxWeight);
+  d.roll_off_rad_s = s.number("roll_off_rad_s", 1.0, kMaxWeight);
+  d.outer_gain_pp_a = s.number("outer_gain_pp_a", kMinWeight, kMaxWeight);
+  d.outer_zero_p = s.number("outer_zero_p", kMinWeight, kMaxWeight);
+  d.outer_pole_p = s.number("outer_pole_p", kMinWeight, kMaxWeight);
+  d.outer_roll_off_rad_s = s.number("outer_roll_off_rad_s", 1.0, kMaxWeight);
+  s.finish();
+  return d;
+}
+
+MipLqrDesign read_lqr_design(Section s, double* input_delay_s) {
+  MipLqrDesign d;
+  d.theta_rad = s.number("theta_rad", kMinWeight, kMaxWeight);
+  d.phi_rad = s.number("phi_rad", kMinWeight, kMaxWeight);
+  d.theta_dot_rad_s = s.number("theta_dot_rad_s", kMinWeight, kMaxWeight);
+  d.phi_dot_rad_s = s.number("phi_dot_rad_s", kMinWeight, kMaxWeight);
+  d.u_x = s.number("u_x", kMinWeight, kMaxWeight);
+  *input_delay_s = s.number("input_delay_s", 0.0, kTickS);
+  s.finish();
+  return d;
+}
+
+MipYawDesign read_yaw_design(Section s) {
+  MipYawDesign d;
+  d.psi_rad = s.number("psi_rad", kMinWeight, kMaxWeight);
+  d.psi_dot_rad_s = s.number("psi_dot_rad_s", kMinWeight, kMaxWeight);
+  d.u_z = s.number("u_z", kMinWeight, kMaxWeight);
+  s.finish();
+  return d;
+}
+
 MipWorldParams read_mip_world(Section s, BridgeType* bridge) {
   MipWorldParams w;
   w.process_noise_sigma = s.vector<6>("process_noise_variance", 0.0, 10.0).cwiseSqrt();
@@ -116,13 +154,19 @@ Loaded<MipConfig> read_mip(const Document& document) {
   Section slc = controller.table("slc");
   c.slc.published = slc.boolean("published");
   read_limits(slc, c.slc);
+  c.design.slc = read_slc_design(slc.table("design"));
   slc.finish();
   Section lqr = controller.table("lqr");
   read_limits(lqr, c.lqr);
+  c.design.lqr = read_lqr_design(lqr.table("design"), &c.design.input_delay_s);
   lqr.finish();
+  c.design.yaw = read_yaw_design(controller.table("yaw"));
+  c.slc.gains = c.lqr.gains = design_mip(c.robot, c.design);
   controller.finish();
   c.safety = config::read_safety(root.table("safety"));
   c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
+
+  c.chain = config::read_chain(root.table("chain"));
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "equipoise/config.hpp"
+#include "equipoise/control/chain.hpp"
 #include "equipoise/overrides.hpp"
 #include "equipoise/pipeline.hpp"
 #include "robots/mip/estimators.hpp"
@@ -27,10 +28,12 @@ struct MipConfig {
   FrictionCompensation friction;
   MipEstimatorParams estimators;
   MipReferenceParams reference;
+  MipDesignParams design;
   MipSlcParams slc;
   MipLqrParams lqr;
   SafetyParams safety;
   AttitudeFilterParams attitude;
+  Chain chain;
   std::array<MipWorldParams, 4> world;       // by Fidelity
   std::array<BridgeType, 4> world_bridge{};  // what the simulated robot is built with
 

@@ -1,13 +1,14 @@
 // Successive loop closure of the MIP, [T] Fig. 3.3: the outer loop D2 turns the wheel error into a lean, the
 // inner loop D1 the lean error into u_x; yaw by PD and feed-forward, (3.52). In: state errors -> out: u_x,
-// u_z. Generated for 200 Hz, or as published for 100 Hz, which runs every other tick (docs/derivation.md).
-// Limits are inside the filters, so that saturation does not wind up D1's integrator. RT-safe.
+// u_z. Designed at start for 200 Hz, or as published for 100 Hz, which runs every other tick
+// (docs/derivation.md). Limits are inside the filters, so that saturation does not wind up D1's integrator.
+// RT-safe.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
-#include "generated/mip_gains.hpp"
+#include "robots/mip/design.hpp"
 #include "robots/mip/reference.hpp"
 
 namespace equipoise {
@@ -15,7 +16,7 @@ namespace equipoise {
 /// Second-order difference equation whose output is limited before it is remembered.
 class LimitedSecondOrder {
  public:
-  explicit LimitedSecondOrder(const generated::mip::SecondOrder& c) : c_(c) {}
+  explicit LimitedSecondOrder(const SecondOrder& c) : c_(c) {}
   void reset() noexcept { e1_ = e2_ = y1_ = y2_ = 0.0; }
   double update(double e, double limit) noexcept {
     const double y = c_.b0 * e + c_.b1 * e1_ + c_.b2 * e2_ - c_.a1 * y1_ - c_.a2 * y2_;
@@ -27,11 +28,12 @@ class LimitedSecondOrder {
   }
 
  private:
-  generated::mip::SecondOrder c_;
+  SecondOrder c_;
   double e1_ = 0.0, e2_ = 0.0, y1_ = 0.0, y2_ = 0.0;
 };
 
 struct MipSlcParams {
+  MipGains gains;
   bool published = false;      // [T]'s robot library, 100 Hz
   double max_lean_rad = 0.30;  // limit of theta_ref
   double max_u = 1.5;          // beyond the supply; friction and bridge compensation come after
@@ -43,10 +45,10 @@ class MipSlcFeedback {
   using Params = MipSlcParams;
   explicit MipSlcFeedback(const Params& params)
       : p_(params),
-        design_(params.published ? generated::mip::kSlcPublished : generated::mip::kSlc),
-        every_(static_cast<int>(std::lround(kTickHz / design_.rate_hz))),
-        D1_(design_.D1),
-        D2_(design_.D2) {}
+        yaw_(params.published ? params.gains.yaw_published : params.gains.yaw),
+        every_(params.published ? static_cast<int>(std::lround(kTickHz / kMipPublishedHz)) : 1),
+        D1_(params.published ? kMipPublishedD1 : params.gains.slc.D1),
+        D2_(params.published ? kMipPublishedD2 : params.gains.slc.D2) {}
 
   Vec2 update(const MipReference& ref) noexcept {
     if (ref.restart) {
@@ -60,14 +62,12 @@ class MipSlcFeedback {
       u_x_ = D1_.update(theta_ref + ref.d_theta, p_.max_u * std::min(grown, 1.0));
     }
     ticks_ = std::min(ticks_ + 1, 1 << 20);
-    const double u_z = design_.yaw_angle * ref.d_psi + design_.yaw_rate * ref.d_psi_dot +
-                       generated::mip::kYawFeedforward * ref.psi_dot;
-    return {u_x_, u_z};
+    return {u_x_, yaw_.angle * ref.d_psi + yaw_.rate * ref.d_psi_dot + yaw_.feedforward * ref.psi_dot};
   }
 
  private:
   Params p_;
-  generated::mip::Slc design_;
+  MipYawGains yaw_;
   int every_;
   LimitedSecondOrder D1_, D2_;
   int ticks_ = 0;

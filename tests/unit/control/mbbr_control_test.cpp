@@ -131,8 +131,14 @@ TEST(MbbrThesisFeedback, FeedsTheSteadyYawTorqueForward) {
   EXPECT_NEAR(feedback.update(ref).z(), -0.65, 0.01);  // 0.65 at 1.5 Hz
 }
 
+MbbrScheduledFeedbackParams scheduled_params() {
+  MbbrScheduledFeedbackParams p;
+  p.gains = design_mbbr(MbbrParameters{}, MbbrDesignParams{});
+  return p;
+}
+
 TEST(MbbrScheduledFeedback, CrossGainsGrowWithTheSpinAndMirrorWithItsSign) {
-  const MbbrScheduledFeedback feedback({});
+  MbbrScheduledFeedback feedback(scheduled_params());
   const auto cross = [&](double hz) {
     MbbrReference ref;
     ref.yaw_rate = 2.0 * kPi * hz;
@@ -145,7 +151,7 @@ TEST(MbbrScheduledFeedback, CrossGainsGrowWithTheSpinAndMirrorWithItsSign) {
 }
 
 TEST(MbbrScheduledFeedback, LeanIsCorrectedByDrivingTheBallUnderIt) {
-  const MbbrScheduledFeedback feedback({});
+  MbbrScheduledFeedback feedback(scheduled_params());
   MbbrReference ref;
   ref.d_theta = Vec2(-0.05, 0.0);            // the estimate leans by +0.05
   EXPECT_GT(feedback.update(ref).x(), 0.0);  // +u_x pushes theta_x negative

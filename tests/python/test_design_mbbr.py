@@ -4,8 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
-from derive import lqr, mbbr, mbbr_gains, mbbr_linear
-from derive.mbbr_simulation import Scenario, simulate
+from derive import mbbr
+from reference_design import lqr, mbbr_gains, mbbr_linear
+from reference_design.mbbr_simulation import Scenario, simulate
 
 HZ = 2 * np.pi
 

@@ -10,8 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 import sympy as sp
+from derive import mbbr
 
-from . import mbbr, mbbr_gains
+from . import mbbr_gains
 
 STEP_S = 0.001
 SMOOTHING_RAD_S = 0.05  # of the plant's Coulomb friction: sign(x) as tanh(x / this)
@@ -149,7 +150,7 @@ class _Controller:
 
 
 def simulate(scenarios: list[Scenario], duration_s: float = 10.0) -> list[Outcome]:
-    dt = mbbr_gains.weights()["tick_s"]
+    dt = mbbr_gains.TICK_S
     world, controller = _World(scenarios), _Controller(scenarios)
     runs = len(scenarios)
     x = np.zeros((10, runs))

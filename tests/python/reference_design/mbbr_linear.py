@@ -10,8 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 import sympy as sp
-
-from . import mbbr
+from derive import mbbr
 
 
 @lru_cache(maxsize=1)

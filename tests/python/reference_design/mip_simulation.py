@@ -11,9 +11,10 @@ from functools import lru_cache
 
 import numpy as np
 import sympy as sp
+from derive import mip
 
-from . import mip, mip_gains
-from .mbbr_gains import weights
+from . import mip_gains
+from .mip_gains import TICK_S
 
 STEP_S = 0.001
 SMOOTHING_RAD_S = 0.05  # of the plant's Coulomb friction: sign(x) as tanh(x / this)
@@ -90,7 +91,7 @@ class _Controller:
 
     def __init__(self, kind, scenarios):
         self.slc = mip_gains.PUBLISHED if kind == "published" else mip_gains.slc_design()
-        self.period = round(1 / (self.slc.rate_hz * weights()["tick_s"]))
+        self.period = round(1 / (self.slc.rate_hz * TICK_S))
         self.gains = mip_gains.lqr_gains() if kind == "lqr" else None
         self.D1, self.D2 = (_Filter(tf, len(scenarios)) for tf in (self.slc.D1, self.slc.D2))
         self.yaw = np.array([s.yaw_rad_s for s in scenarios])
@@ -114,7 +115,7 @@ class _Controller:
 def simulate(scenarios: list[Scenario], duration_s: float = 10.0) -> list[Outcome]:
     """All scenarios must share controller and delay."""
     (kind,), (delay,) = {s.controller for s in scenarios}, {s.delay_ticks for s in scenarios}
-    dt, runs = weights()["tick_s"], len(scenarios)
+    dt, runs = TICK_S, len(scenarios)
     world, controller = _World(scenarios), _Controller(kind, scenarios)
     x = np.zeros((6, runs))
     x[0] = [s.tilt_rad for s in scenarios]

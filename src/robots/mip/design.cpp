@@ -1,0 +1,102 @@
+#include "robots/mip/design.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "robots/mip/models.hpp"
+
+namespace equipoise {
+namespace {
+
+double weight(double deviation) { return 1.0 / (deviation * deviation); }
+
+/// Second order in s, ascending powers.
+struct Polynomial {
+  double c0, c1, c2;
+};
+
+/// Tustin's rule.
+SecondOrder discrete(const Polynomial& top, const Polynomial& bottom) {
+  const double k = 2.0 * kTickHz;
+  const auto in_z = [k](const Polynomial& s) {  // s = k (z - 1)/(z + 1), times (z + 1)^2
+    const double second = s.c2 * k * k;
+    return Vec3(second + s.c1 * k + s.c0, 2.0 * (s.c0 - second), second - s.c1 * k + s.c0);
+  };
+  const Vec3 b = in_z(top);
+  const Vec3 a = in_z(bottom);
+  return {b(0) / a(0), b(1) / a(0), b(2) / a(0), a(1) / a(0), a(2) / a(0)};
+}
+
+}  // namespace
+
+MipLinear mip_linear(const MipParameters& p, double yaw_rate_rad_s) {
+  const MipCoefficients c = mip_coefficients(p, 0.0, p.l);
+  const double turn2 = yaw_rate_rad_s * yaw_rate_rad_s;
+  MipLinear s{CMatrix::Zero(4, 4), CMatrix::Zero(4, 1)};
+  s.A(0, 2) = s.A(1, 3) = 1.0;
+  s.A(2, 0) = c.theta_ddot_th + c.theta_ddot_th_dps2 * turn2;
+  s.A(2, 3) = c.theta_ddot_dph;
+  s.A(3, 0) = c.phi_ddot_th + c.phi_ddot_th_dps2 * turn2;
+  s.A(3, 3) = c.phi_ddot_dph;
+  s.b(2, 0) = c.theta_ddot_ux;
+  s.b(3, 0) = c.phi_ddot_ux;
+  return s;
+}
+
+MipLinear mip_yaw_linear(const MipParameters& p) {
+  const MipCoefficients c = mip_coefficients(p, 0.0, p.l);
+  MipLinear s{CMatrix::Zero(2, 2), CMatrix::Zero(2, 1)};
+  s.A(0, 1) = 1.0;
+  s.A(1, 1) = c.psi_ddot_dps;
+  s.b(1, 0) = c.psi_ddot_uz;
+  return s;
+}
+
+MipSlcGains design_mip_slc(const MipParameters& p, const MipSlcDesign& d) {
+  const MipLinear s = mip_linear(p, 0.0);
+  const Eigen::Matrix4d A = s.A.real();
+  Eigen::Matrix3d tilt_and_rates;  // without phi, which is an integrator
+  tilt_and_rates << 0.0, 1.0, 0.0, A(2, 0), 0.0, A(2, 3), A(3, 0), 0.0, A(3, 3);
+  const Vec3 poles = Eigen::EigenSolver<Eigen::Matrix3d>(tilt_and_rates, false).eigenvalues().real();
+  const double unstable = poles.maxCoeff();
+  const double fastest = -poles.minCoeff();
+  const double hold = std::abs(A(2, 0) / s.b(2, 0).real());
+  const double wheel_per_lean = std::abs(A(3, 0) + s.b(3, 0).real() * hold);
+
+  const double integral = d.integral_p * unstable;
+  const double lead = d.lead_q * fastest;
+  const double outer_gain = d.outer_gain_pp_a * unstable * unstable / wheel_per_lean;
+  const double zero = d.outer_zero_p * unstable;
+  const double pole = d.outer_pole_p * unstable;
+  const double gain = -d.gain_U * hold;
+  MipSlcGains g;
+  g.D1 = discrete({gain * integral, gain * (1.0 + integral / lead), gain / lead},
+                  {0.0, 1.0, 1.0 / d.roll_off_rad_s});
+  g.D2 = discrete({outer_gain, outer_gain / zero, 0.0},
+                  {1.0, 1.0 / pole + 1.0 / d.outer_roll_off_rad_s, 1.0 / (pole * d.outer_roll_off_rad_s)});
+  return g;
+}
+
+MipGains design_mip(const MipParameters& p, const MipDesignParams& d) {
+  MipGains g;
+  g.slc = design_mip_slc(p, d.slc);
+
+  const MipLinear s = mip_linear(p, 0.0);
+  const CMatrix K = lqr(sampled(s.A, s.b, kTickS, d.input_delay_s),
+                        Vec<4>(weight(d.lqr.theta_rad), weight(d.lqr.phi_rad), weight(d.lqr.theta_dot_rad_s),
+                               weight(d.lqr.phi_dot_rad_s)),
+                        Vec<1>(weight(d.lqr.u_x)));
+  g.lqr = {K(0, 0).real(), K(0, 1).real(), K(0, 2).real(), K(0, 3).real(), -K(0, 4).real()};
+
+  const MipLinear yaw = mip_yaw_linear(p);
+  const CMatrix K_z =
+      lqr(sampled(yaw.A, yaw.b, kTickS, 0.0), Vec2(weight(d.yaw.psi_rad), weight(d.yaw.psi_dot_rad_s)),
+          Vec<1>(weight(d.yaw.u_z)));
+  const double against_back_emf = (-yaw.A(1, 1) / yaw.b(1, 0)).real();
+  g.yaw = {K_z(0, 0).real(), K_z(0, 1).real(), against_back_emf};
+  g.yaw_published = {1.0, 0.05, against_back_emf};
+  g.speed = (-s.A(2, 3) / s.b(2, 0)).real();
+  return g;
+}
+
+}  // namespace equipoise
