@@ -231,7 +231,7 @@ TEST_F(GuardProcess, MotorsStayOffWhenAStoppedLoopWakesUp) {
 
 TEST(SupervisorTest, ADeadGuardForbidsMotors) {
   runtime::HeartbeatPage page{};
-  runtime::Supervisor supervisor({}, &page, 0);
+  runtime::Supervisor supervisor({&page, 0, nullptr, false});
   RawSample raw{};
   std::int64_t now = 1'000'000'000;
   const auto tick = [&](bool guard_lives) {
@@ -255,7 +255,7 @@ TEST(SupervisorTest, ADeadGuardForbidsMotors) {
 }
 
 TEST(SupervisorTest, AFailedWriteForbidsMotors) {
-  runtime::Supervisor supervisor({}, nullptr, kRealtimeMissing);
+  runtime::Supervisor supervisor({nullptr, kRealtimeMissing, nullptr, false});
   RawSample raw{};
   raw.t_ns = kTick_ns;
   EXPECT_EQ(supervisor.begin(kTick_ns, raw), kRealtimeMissing);

@@ -39,7 +39,7 @@ std::vector<Field> every_field() {
   return fields;
 }
 
-bool finite(const StateView& v) {
+bool all_numbers(const StateView& v) {
   return v.theta_rad.allFinite() && v.omega_B_rad_s.allFinite() && v.phi_rad.allFinite() &&
          v.phi_dot_rad_s.allFinite();
 }
@@ -71,7 +71,7 @@ TEST_P(NotFinite, StopsTheMotorsInTheSameTickAndIsForgottenOnceFiniteAgain) {
     EXPECT_LT(loop.world.truth().theta_xy.norm(), 0.15);
     for (std::size_t i = 0; i < MbbrEstimators::kCount; ++i) {
       const auto id = static_cast<MbbrEstimatorId>(i);
-      EXPECT_TRUE(finite(view(loop.pipeline.estimators().estimate(id), loop.config.robot)))
+      EXPECT_TRUE(all_numbers(view(loop.pipeline.estimators().estimate(id), loop.config.robot)))
           << kMbbrEstimatorNames[i];
     }
   }

@@ -117,9 +117,15 @@ class DeadWire final : public runtime::CommandWire {
 };
 
 std::uint32_t silent_remote() {
-  runtime::CommandReceiver receiver(runtime::CommandKey({1, 2, 3}), std::make_unique<DeadWire>());
+  runtime::CommandReceiver receiver(runtime::CommandKeys::of_robot("robot", runtime::CommandKey({1, 2, 3})),
+                                    {"robot", SafetyParams().command_timeout_s, nullptr},
+                                    std::make_unique<DeadWire>());
   Scene scene;
-  scene.commands = [&](std::int64_t, std::int64_t now_ns) { return receiver.latest(now_ns); };
+  scene.commands = [&](std::int64_t tick, std::int64_t) {
+    // The receiver's clock is the real one; the scene's runs ahead of it.
+    if (tick == 1) std::this_thread::sleep_for(std::chrono::milliseconds(600));
+    return receiver.latest();
+  };
   return mbbr(scene);
 }
 
