@@ -106,7 +106,7 @@ std::uint32_t held_fast(double lean_rad) {
         raw.accel_counts[1] = 0.0;
         raw.accel_counts[2] = 4096.0 * std::cos(lean_rad);
       },
-      {"safety.encoder_check_drive=0.0", "safety.max_innovation=1e6"});
+      {"safety.encoder_check_drive=0.0", "safety.max_innovation=1000.0"});
 }
 
 /// A wire on which nobody speaks.
@@ -190,7 +190,7 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
        scene.arm = false;
        return mbbr(scene);
      }},
-    {kTilt, [] { return mbbr({{"world.nominal.initial_tilt_rad=0.5"}}); }},
+    {kTilt, [] { return mbbr({{"world.nominal.initial_tilt_rad=0.3"}}); }},
     {kImuStale, [] { return after(app::FaultKind::kImuOff); }},
     {kEncoderStale,
      [] {
@@ -235,7 +235,7 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
              const double slid_rad = tick > 100 ? 40.0 * kTickS * static_cast<double>(tick - 100) : 0.0;
              for (double& counts : raw.encoder_counts) counts += 720.0 / (2.0 * kPi) * slid_rad;
            },
-           {"safety.encoder_check_drive=0.0", "safety.max_innovation=1e6"});
+           {"safety.encoder_check_drive=0.0", "safety.max_innovation=1000.0"});
      }},
     {kEncoderJump, [] { return after(app::FaultKind::kCountJump); }},
     {kBridgeFault,

@@ -108,7 +108,7 @@ TEST(Board, OneBridgeOfAnotherTypeIsRefused) {
 TEST(Board, AMountThatIsNoRotationIsRefusedWithItsLine) {
   EXPECT_THAT(complaint(text_of(kBoards + "robotics_cape_mbbr.toml"), "[1, 0, 0, 0, 1, 0, 0, 0, 1]",
                         "[1, 0, 0, 0, 1, 0, 0, 0, 0.5]"),
-              StartsWith("b.toml:22: imu.R_BS: is not a rotation matrix"));
+              StartsWith("b.toml:23: imu.R_BS: is not a rotation matrix"));
 }
 
 TEST(Board, WhatWasMeasuredReplacesTheConfigurationsAndIsLogged) {
@@ -135,7 +135,7 @@ TEST(Board, WhatWasMeasuredReplacesTheConfigurationsAndIsLogged) {
 TEST(Board, WrongKeysAreRefusedWithLineAndRange) {
   const std::string text = text_of(kBoards + "robotics_cape_mbbr.toml");
   EXPECT_EQ(complaint(text, "address = 0x68", "address = 0x99"),
-            "b.toml:12: imu.address: 153 is out of range; allowed: 8 to 119");
+            "b.toml:13: imu.address: 153 is out of range; allowed: 8 to 119");
   EXPECT_NE(complaint(text, "accel_range_g = 8", "accel_range_g = 7").find("allowed: 2, 4, 8, 16"),
             std::string::npos);
   EXPECT_NE(complaint(text, "[\"481ae000\", 21]", "[\"481ae000\", 32]").find("allowed: 0 to 31"),
