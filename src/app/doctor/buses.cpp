@@ -167,8 +167,8 @@ void examine_adc(const Patient& patient, Findings* findings) {
     findings->fail("battery.adc", device + "/" + attribute + ": " + reason(status), overlay_fix(patient));
     return;
   }
-  const double volts =
-      patient.board->facts.battery_V_per_count * static_cast<double>(counts) + patient.board->facts.battery_offset_V;
+  const double volts = patient.board->facts.battery_V_per_count * static_cast<double>(counts) +
+                       patient.board->facts.battery_offset_V;
   char text[64];
   std::snprintf(text, sizeof text, "%.2f V (%lld counts)", volts, static_cast<long long>(counts));
   constexpr double kTwoCells_V = 6.4;  // 3.2 V per LiPo cell: as good as empty

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0
-/* A kernel that hangs: no interrupt is ever served again. Loaded, it says on the console's own registers how many
- * seconds have passed since, for whoever waits for the watchdog's reset. */
+/* A kernel that hangs: no interrupt is ever served again. Loaded, it says on the console's own registers how
+ * many seconds have passed since, for whoever waits for the watchdog's reset. */
 #include <linux/io.h>
 #include <linux/irqflags.h>
 #include <linux/ktime.h>

@@ -2,8 +2,8 @@
 
     python graft.py QEMU.dtb BOARD.dtb >machine.dts
 
-The real pinctrl-single and gpio-omap bind at the addresses they have on the AM335x; there QEMU has memory, which is
-taken away from the kernel. Whoever else claims pads is a bus without devices under its real name and address.
+The real pinctrl-single and gpio-omap bind at the addresses they have on the AM335x; there QEMU has memory,
+which is taken away from the kernel. Whoever else claims pads is a bus without devices under its name and address.
 """
 
 import re
