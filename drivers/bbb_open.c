@@ -87,8 +87,9 @@ static int open_imu(bbb_t* bbb, const bbb_imu_t* config, bbb_error_t* error) {
 
 static int open_dmp(bbb_t* bbb, const bbb_imu_t* config, bbb_error_t* error) {
   if (config->dmp_firmware[0] == '\0') return 0;
-  if (config->accel_range_g != 2 || config->gyro_range_dps != 2000 || config->rate_hz != 200) {
-    return bbb_fail(error, -EINVAL, "dmp", "needs 2 g, 2000 deg/s, 200 Hz");
+  const bool known_range = config->accel_range_g == 2 || config->accel_range_g == 8;
+  if (!known_range || config->gyro_range_dps != 2000 || config->rate_hz != 200) {
+    return bbb_fail(error, -EINVAL, "dmp", "needs 2 g or 8 g, 2000 deg/s, 200 Hz");
   }
   uint8_t firmware[DMP_FIRMWARE_BYTES];
   int status = dmp_read_firmware(config->dmp_firmware, firmware);

@@ -16,7 +16,15 @@ bool button_filter_update(button_filter_t* filter, bool level) {
 int button_open(button_t* button, const gpio_pin_t* pin, unsigned stable_polls) {
   memset(button, 0, sizeof *button);
   button->filter.stable_polls = stable_polls;
-  return gpio_open_input(&button->line, pin);
+  int status = gpio_open_input(&button->line, pin);
+  if (status < 0) return status;
+  status = gpio_get(&button->line);
+  if (status < 0) {
+    button_close(button);
+    return status;
+  }
+  button->filter.candidate = button->filter.pressed = status == 1; /* held since before: no press */
+  return 0;
 }
 
 int button_poll(button_t* button, bool* was_pressed) {

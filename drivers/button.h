@@ -24,7 +24,8 @@ typedef struct button {
   button_filter_t filter;
 } button_t;
 
-int button_open(button_t* button, const gpio_pin_t* pin, unsigned stable_polls); /* pin says active low */
+/* The pin says active low. A button that is down already counts once it has been up. */
+int button_open(button_t* button, const gpio_pin_t* pin, unsigned stable_polls);
 int button_poll(button_t* button, bool* was_pressed); /* *was_pressed: a new press */
 void button_close(button_t* button);
 

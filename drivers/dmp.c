@@ -130,12 +130,22 @@ static int run(dmp_t* dmp) {
   return status;
 }
 
+/* The packets must find the room that the backlog's limit counts on. */
+static int set_fifo_size(const i2c_dev_t* i2c) {
+  uint8_t accel = 0;
+  const int status = i2c_dev_read(i2c, MPU9250_ACCEL_CONFIG_2, &accel, 1);
+  if (status < 0) return status;
+  accel = (uint8_t)((accel & ~MPU9250_FIFO_SIZE_MASK) | MPU9250_FIFO_1024);
+  return i2c_dev_write_byte(i2c, MPU9250_ACCEL_CONFIG_2, accel);
+}
+
 int dmp_start(dmp_t* dmp, const i2c_dev_t* i2c, const uint8_t firmware[DMP_FIRMWARE_BYTES]) {
   memset(dmp, 0, sizeof *dmp);
   dmp->i2c = i2c;
   int status = set_interrupt(dmp, 0);
   if (status == 0) status = i2c_dev_write_byte(i2c, MPU9250_FIFO_EN, 0);
   if (status == 0) status = set_control(dmp, 0);
+  if (status == 0) status = set_fifo_size(i2c);
   if (status == 0) status = load_firmware(i2c, firmware);
   for (size_t i = 0; status == 0 && i < sizeof kSettings / sizeof *kSettings; ++i) {
     status = load_memory(i2c, kSettings[i].address, kSettings[i].bytes, kSettings[i].length);

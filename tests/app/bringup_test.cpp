@@ -2,11 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "app/board/board_edit.hpp"
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/commission/practice.hpp"
+#include "app/commission/simulated_stand.hpp"
 #include "app/io/mock.hpp"
 #include "equipoise/config.hpp"
 #include "robots/mbbr/config.hpp"
@@ -22,29 +24,29 @@ using ::testing::IsEmpty;
 const std::string kSource = EQUIPOISE_SOURCE_DIR;
 const std::string kMbbrBoard = kSource + "/config/boards/robotics_cape_mbbr.toml";
 
-PracticeSetup mbbr_setup() {
+StandSetup mbbr_setup() {
   const MbbrConfig config = load_mbbr(kSource + "/config/mbbr.toml", {}).config;
   return {layout_of(config.robot, config.motor, config.calibration), Vec3::UnitY(), config.motor,
           config.calibration, config.world[static_cast<std::size_t>(Fidelity::kNominal)].common};
 }
 
-PracticeSetup mip_setup() {
+StandSetup mip_setup() {
   const MipConfig config = load_mip(kSource + "/config/edumip.toml", {}).config;
   return {layout_of(config.robot, config.motor, config.calibration), Vec3::UnitX(), config.motor,
           config.calibration, config.world[static_cast<std::size_t>(Fidelity::kNominal)].common};
 }
 
-std::vector<WheelFinding> pulses(const PracticeSetup& setup, PracticeRobot& robot) {
-  Session session(robot.io(), robot.ask());
+std::vector<WheelFinding> pulses(const StandSetup& setup, SimulatedStand& robot) {
+  ManualDrive manual(robot.io(), robot.ask());
   std::vector<WheelFinding> findings;
   for (int i = 0; i < setup.layout.wheels; ++i)
-    findings.push_back(pulse(session, setup.layout, setup.calibration, i));
-  settle(session, setup.layout, &findings);
+    findings.push_back(pulse(manual, setup.layout, setup.calibration, i));
+  settle(manual, setup.layout, &findings);
   return findings;
 }
 
-std::string complaint_with(const PracticeSetup& setup, const std::vector<std::string>& faults) {
-  PracticeRobot robot(setup, parse_faults(faults, setup.layout.wheels));
+std::string complaint_with(const StandSetup& setup, const std::vector<std::string>& faults) {
+  SimulatedStand robot(setup, parse_faults(faults, setup.layout.wheels));
   try {
     return complaint(pulses(setup, robot));
   } catch (const JobError& error) {
@@ -58,7 +60,7 @@ TEST(Pulses, FindNothingWrongWithARobotWiredAsItsBoardFileSays) {
 }
 
 TEST(Pulses, FindEveryFaultOfOrderAndSign) {
-  const PracticeSetup mbbr = mbbr_setup();
+  const StandSetup mbbr = mbbr_setup();
   EXPECT_EQ(complaint_with(mbbr, {"motor-2-reversed"}), "motor 2 turns backwards");
   EXPECT_EQ(complaint_with(mbbr, {"encoder-3-reversed"}), "encoder 3 counts backwards");
   EXPECT_EQ(complaint_with(mbbr, {"encoders-1-3-swapped"}),
@@ -107,11 +109,11 @@ struct Watch {
 };
 
 TEST(Pulses, AreTinyAndShortAndEndWithMotorsOff) {
-  const PracticeSetup setup = mip_setup();  // drive/brake: duty is the share of the stall torque
-  PracticeRobot robot(setup, {});
+  const StandSetup setup = mip_setup();  // drive/brake: duty is the share of the stall torque
+  SimulatedStand robot(setup, {});
   Watch watch{robot.io()};
-  Session session(watch.io(), robot.ask());
-  pulse(session, setup.layout, setup.calibration, 0);
+  ManualDrive manual(watch.io(), robot.ask());
+  pulse(manual, setup.layout, setup.calibration, 0);
   EXPECT_GT(watch.largest, 0.05);
   EXPECT_LE(watch.largest, 0.35);
   EXPECT_LE(watch.driven_ticks, 100 + 48);  // a ramp of 0.5 s, four strokes of 60 ms
@@ -119,14 +121,14 @@ TEST(Pulses, AreTinyAndShortAndEndWithMotorsOff) {
 }
 
 TEST(Pulses, OnCtrlCLeaveTheMotorsOff) {
-  const PracticeSetup setup = mbbr_setup();
+  const StandSetup setup = mbbr_setup();
   for (const int tick : {1, 20, 60}) {
-    PracticeRobot robot(setup, {});
+    SimulatedStand robot(setup, {});
     Watch watch{robot.io()};
     watch.stop_after = tick;
     {
-      Session session(watch.io(), robot.ask());
-      EXPECT_THROW(pulse(session, setup.layout, setup.calibration, 0), JobError);
+      ManualDrive manual(watch.io(), robot.ask());
+      EXPECT_THROW(pulse(manual, setup.layout, setup.calibration, 0), JobError);
       EXPECT_FALSE(watch.on) << "in tick " << tick;
     }
     interrupted = false;
@@ -134,28 +136,70 @@ TEST(Pulses, OnCtrlCLeaveTheMotorsOff) {
   }
 }
 
-TEST(Session, WithoutValidSamplesGivesUpWithMotorsOff) {
+/// An encoder whose phase B is stuck: A alone goes up and down with every second edge.
+struct DeadPhaseB {
+  rio_t inner;
+  std::size_t encoder;
+
+  rio_t io() {
+    static const rio_ops_t ops{
+        [](void* p, std::int64_t* now_ns) { return rio_wait_tick(&self(p).inner, now_ns); },
+        [](void* p, rio_sensors_t* s) {
+          const int status = rio_read_sensors(&self(p).inner, s);
+          double& counts = s->encoder_counts[self(p).encoder];
+          const auto edge = static_cast<std::int64_t>(std::floor(counts)) & 3;
+          counts = edge == 1 || edge == 2 ? 1.0 : 0.0;
+          return status;
+        },
+        [](void* p, const rio_motors_t* m) { return rio_write_motors(&self(p).inner, m); },
+        [](void* p) { return rio_motors_off(&self(p).inner); }, [](void*) {}};
+    return {&ops, this};
+  }
+  static DeadPhaseB& self(void* p) { return *static_cast<DeadPhaseB*>(p); }
+};
+
+TEST(Pulses, TellADeadEncoderPhaseFromAnEncoderThatDoesNotCount) {
+  const StandSetup setup = mbbr_setup();
+  const auto words = [&](rio_t io, Ask ask) -> std::string {
+    ManualDrive manual(io, std::move(ask));
+    try {
+      pulse(manual, setup.layout, setup.calibration, 1);
+    } catch (const JobError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  SimulatedStand robot(setup, {});
+  DeadPhaseB half{robot.io(), 1};
+  Watch watch{half.io()};
+  EXPECT_NE(words(watch.io(), robot.ask()).find("encoder 2 counts one up and one down"), std::string::npos);
+  EXPECT_FALSE(watch.on);
+  SimulatedStand held(setup, parse_faults({"motor-2-dead"}, 3));
+  EXPECT_NE(words(held.io(), held.ask()).find("no encoder moves"), std::string::npos);
+}
+
+TEST(ManualDrive, WithoutValidSamplesGivesUpWithMotorsOff) {
   rio_sensors_t blind{};
   blind.valid = RIO_ENCODERS;
   Mock mock(std::vector<rio_sensors_t>(20, blind));
-  Session session(mock.io(), [](const Request&, std::string*) { return true; });
-  EXPECT_THROW(session.drive({0.1, 0, 0, 0}), JobError);
+  ManualDrive manual(mock.io(), [](const Request&, std::string*) { return true; });
+  EXPECT_THROW(manual.drive({0.1, 0, 0, 0}), JobError);
   ASSERT_FALSE(mock.written.empty());
   EXPECT_FALSE(mock.written.back().enable);
 }
 
-TEST(Session, WhoeverIsAskedMayStop) {
+TEST(ManualDrive, WhoeverIsAskedMayStop) {
   Mock mock({});
-  Session session(mock.io(), [](const Request&, std::string*) { return false; });
-  EXPECT_THROW(session.ask({Request::kUpright, "upright?"}), JobError);
+  ManualDrive manual(mock.io(), [](const Request&, std::string*) { return false; });
+  EXPECT_THROW(manual.ask({Request::kUpright, "upright?"}), JobError);
 }
 
 TEST(BoardEdit, MakesARobotThatIsWiredOtherwiseFit) {
-  const PracticeSetup setup = mbbr_setup();
+  const StandSetup setup = mbbr_setup();
   const Board before = load_board(kMbbrBoard);
-  PracticeRobot robot(setup, parse_faults({"motors-1-2-swapped", "encoders-2-3-swapped", "motor-1-reversed",
-                                           "encoder-3-reversed"},
-                                          3));
+  SimulatedStand robot(setup, parse_faults({"motors-1-2-swapped", "encoders-2-3-swapped", "motor-1-reversed",
+                                            "encoder-3-reversed"},
+                                           3));
   const auto findings = pulses(setup, robot);
   EXPECT_FALSE(complaint(findings).empty());
   const std::string text = rewired(read_text(kMbbrBoard), findings);

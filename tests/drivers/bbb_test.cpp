@@ -7,6 +7,7 @@
 
 #include "board_fixture.hpp"
 #include "monotonic.h"
+#include "mpu9250_registers.h"
 
 using BbbTest = BoardFixture;
 
@@ -239,8 +240,14 @@ TEST_F(BbbTest, EveryMissingPartIsNamedAndLeavesMotorsOff) {
       {"imu chip", [&] { imu.setWhoAmI(0); }, -ENODEV, "imu: /dev/i2c-2 address 0x68"},
       {"interrupt", [&] { FakeGpio::instance().line("481ae000", 21).open_error = -EBUSY; }, -EBUSY,
        "imu data-ready interrupt: gpio chip 481ae000 line 21"},
-      {"dmp file", [&] { snprintf(config_.imu.dmp_firmware, BBB_FILE_MAX, "/nonexistent/dmp.bin"); }, -EINVAL,
-       "dmp: needs 2 g"},
+      {"dmp range",
+       [&] {
+         config_.imu.accel_range_g = 4;
+         snprintf(config_.imu.dmp_firmware, BBB_FILE_MAX, "/nonexistent/dmp.bin");
+       },
+       -EINVAL, "dmp: needs 2 g or 8 g"},
+      {"dmp file", [&] { snprintf(config_.imu.dmp_firmware, BBB_FILE_MAX, "/nonexistent/dmp.bin"); }, -ENOENT,
+       "dmp: /nonexistent/dmp.bin"},
       {"motors", [&] { config_.motors = 5; }, -EINVAL, "motors"},
       {"rate", [&] { config_.imu.rate_hz = 0; }, -EINVAL, "rate_hz"},
   };
@@ -276,6 +283,17 @@ TEST_F(BbbTest, DmpDeliversAttitudeAndItsFaults) {
   tickAndRead();
   for (int i = 0; i < 40; ++i) imu.pushFifo(dmpPacket({1, 0, 0, 0}));
   EXPECT_EQ(tickAndRead().health, uint32_t{RIO_DMP_OVERFLOW});
+}
+
+TEST_F(BbbTest, DmpRunsAtEightGWithTheLargeFifo) {
+  config_.imu.accel_range_g = 8;
+  const std::string path = writeFile("dmp.bin", std::string(3062, 'x'));
+  snprintf(config_.imu.dmp_firmware, sizeof config_.imu.dmp_firmware, "%s", path.c_str());
+  open();
+  EXPECT_EQ(imu.reg(MPU9250_ACCEL_CONFIG), 2 << 3);
+  EXPECT_EQ(imu.reg(MPU9250_ACCEL_CONFIG_2), MPU9250_FIFO_1024 | config_.imu.dlpf);
+  imu.pushFifo(dmpPacket({0.8, 0.6, 0.0, 0.0}));
+  EXPECT_NE(tickAndRead().valid & RIO_ATTITUDE, 0u);
 }
 
 TEST_F(BbbTest, WrongDmpFileIsNamed) {

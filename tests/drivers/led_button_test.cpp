@@ -55,6 +55,27 @@ TEST(ButtonFilter, ReportsAPressOnceAndIgnoresBounce) {
   EXPECT_EQ(presses, (std::vector<size_t>{8, 19}));
 }
 
+TEST_F(LedButtonTest, AButtonThatIsDownAlreadyIsNoPress) {
+  const gpio_pin_t pin = {"gpio2", 5, true};
+  button_t button;
+  FakeGpio::Line& line = FakeGpio::instance().line("gpio2", 5);
+  line.active = true;
+  ASSERT_EQ(button_open(&button, &pin, 2), 0);
+  bool pressed = false;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(button_poll(&button, &pressed), 0);
+    EXPECT_FALSE(pressed);
+  }
+  int presses = 0;
+  for (const bool level : {false, false, true, true, true}) {
+    line.active = level;
+    ASSERT_EQ(button_poll(&button, &pressed), 0);
+    presses += pressed ? 1 : 0;
+  }
+  EXPECT_EQ(presses, 1);
+  button_close(&button);
+}
+
 TEST_F(LedButtonTest, ButtonReadsItsLine) {
   const gpio_pin_t pin = {"gpio2", 5, true};
   button_t button;

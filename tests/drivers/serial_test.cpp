@@ -10,6 +10,8 @@
 
 #include <string>
 
+#include "testbed.hpp"
+
 namespace {
 class SerialTest : public ::testing::Test {
  protected:
@@ -70,4 +72,15 @@ TEST_F(SerialTest, ReportsBadRateMissingDeviceAndNoTerminal) {
   EXPECT_EQ(serial_open(&serial_, "/dev/nonexistent", 9600), -ENOENT);
   EXPECT_EQ(serial_open(&serial_, "/dev/null", 9600), -ENOTTY);
   EXPECT_EQ(serial_.fd, -1);
+}
+
+using SerialByAddress = Testbed;
+
+TEST_F(SerialByAddress, IsThePortThatTheKernelHasThereWhateverItsName) {
+  serial_t serial{-1};
+  EXPECT_EQ(serial_open(&serial, "48022000", 9600), -ENODEV);
+  addTty("481aa000", "ttyO5");
+  addTty("48022000", "ttyO1");
+  EXPECT_EQ(serial_open(&serial, "48022000", 9600), -ENOENT);  // found; /dev/ttyO1 itself is not made up
+  EXPECT_EQ(serial_open(&serial, "48024000", 9600), -ENODEV);
 }

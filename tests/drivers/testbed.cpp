@@ -98,6 +98,10 @@ std::string Testbed::addLed(const std::string& name) {
   return addDevice("@leds", "leds/" + name, {{"brightness", "0"}});
 }
 
+std::string Testbed::addTty(const std::string& address, const std::string& name) {
+  return addDevice("tty", address + ".serial/tty/" + name, {{"uevent", ""}});
+}
+
 void Testbed::addImu(int bus) {
   const std::string name = "i2c-" + std::to_string(bus);
   bus_node_ = "/dev/" + name;

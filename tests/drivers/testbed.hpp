@@ -21,6 +21,7 @@ class Testbed : public ::testing::Test {
   std::string addLegacyEqep(const std::string& address);
   std::string addAdc(const std::string& name, int number);
   std::string addLed(const std::string& name);
+  std::string addTty(const std::string& address, const std::string& name);  // no node in /dev
   void addImu(int bus = 2);
   void addBoard();  // all a robot with three motors needs
 

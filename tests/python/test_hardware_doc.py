@@ -18,6 +18,7 @@ SYSTEM = {
     "journalctl",
     "ip",
     "tee",
+    "sed",
     "echo",
     "lsblk",
     "dd",
@@ -61,6 +62,9 @@ def test_every_command_exists_with_its_options(root):
         if name == "equipoise" or name == "build/host/equipoise":
             assert (where == "robot") == (name == "equipoise"), words
             text = help_of(str(root / "build/host/equipoise"), words[1])
+        elif name.startswith("/usr/lib/equipoise/"):
+            assert f"put 755 \"$packaging/{name.rsplit('/', 1)[1]}\"" in (root / "tools/package").read_text()
+            continue
         elif name.startswith("tools/"):
             assert where == "laptop", words
             text = help_of(str(root / name))
@@ -82,8 +86,9 @@ def test_calibrations_of_the_page_are_those_of_the_program(root):
 
 def test_files_of_the_page_are_in_the_repository_or_the_package(root):
     text = (root / "docs/hardware.md").read_text()
-    for link in re.findall(r"\]\((\.\./[^)]+)\)", text):
-        assert (root / "docs" / link).exists(), link
+    for page in ("hardware", "wiring", "bringup-checklist"):
+        for link in re.findall(r"\]\(([^)#:]+)\)", (root / f"docs/{page}.md").read_text()):
+            assert (root / "docs" / link).exists(), link
     script = (root / "tools/package").read_text()
     assert "lib/firmware/equipoise-$overlay-${cells}cell.dtbo" in script
     for overlay in set(re.findall(r"/lib/firmware/equipoise-(\w+)\.dtbo", text)):

@@ -49,3 +49,19 @@ def test_all_goes_with_nothing_else(root):
     command = [root / "tools/test", "--all", "--quick"]
     ended = subprocess.run(command, capture_output=True, text=True)
     assert ended.returncode == 2 and ended.stderr.startswith("error: --all")
+
+
+@pytest.mark.parametrize(
+    ("status", "console", "passed"),
+    [
+        (0, "HUNG 1\r\nHUNG 5\r\n", True),
+        (0, "HUNG 1\r\nHUNG 6\r\n", False),  # the watchdog's time is over
+        (0, "VM: hanging from now on\r\n", False),  # it never hung
+        (124, "HUNG 1\r\nHUNG 2\r\n", False),  # nobody reset it
+    ],
+)
+def test_a_hung_machine_must_be_reset_in_the_watchdogs_time(root, status, console, passed):
+    script = f"root={root}; vm=/none; source {root}/tools/lib/vm_kernel.sh; judge_hang {status} 5"
+    ended = subprocess.run(["bash", "-euc", script], input=console, capture_output=True, text=True)
+    assert ("[  PASSED  ] 1 test." in ended.stdout) == passed, ended.stdout
+    assert ("1 FAILED TEST" in ended.stdout) != passed

@@ -66,9 +66,35 @@ TEST(Board, MipHasTwoDriveBrakeBridgesOneReversed) {
   ASSERT_EQ(board.wiring.motors, 2u);
   EXPECT_EQ(board.wiring.motor[0].bridge, BBB_TB6612);
   EXPECT_FALSE(board.wiring.motor[0].fault.used);
-  EXPECT_FALSE(board.wiring.motor[0].motor_reversed);
-  EXPECT_TRUE(board.wiring.motor[1].motor_reversed);
+  // librobotcontrol: polarity {1, -1, -1, 1} of motors 1 to 4; rc_balance: left +1, right -1, motors and
+  // encoders.
+  EXPECT_TRUE(board.wiring.motor[0].motor_reversed);
+  EXPECT_FALSE(board.wiring.motor[0].encoder_reversed);
+  EXPECT_FALSE(board.wiring.motor[1].motor_reversed);
   EXPECT_TRUE(board.wiring.motor[1].encoder_reversed);
+}
+
+TEST(Board, TheBlueIsTheSameRobotOnOtherPins) {
+  const Board cape = load_board(kBoards + "robotics_cape_edumip.toml");
+  const Board blue = load_board(kBoards + "beaglebone_blue_edumip.toml");
+  EXPECT_EQ(cape.overlay, "cape");
+  EXPECT_EQ(blue.overlay, "blue");
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(blue.wiring.motor[i].motor_reversed, cape.wiring.motor[i].motor_reversed);
+    EXPECT_EQ(blue.wiring.motor[i].encoder_reversed, cape.wiring.motor[i].encoder_reversed);
+    EXPECT_STREQ(blue.wiring.motor[i].pwm, cape.wiring.motor[i].pwm);
+    EXPECT_STREQ(blue.wiring.motor[i].encoder, cape.wiring.motor[i].encoder);
+  }
+  // BeagleBoard.org's am335x-boneblue.dts: MDIR_2B is gpio0.10, the battery's second LED gpio0.11.
+  EXPECT_STREQ(blue.wiring.motor[1].in2.chip, "44e07000");
+  EXPECT_EQ(blue.wiring.motor[1].in2.line, 10u);
+  EXPECT_EQ(blue.led_bars[1].line, 11);
+}
+
+TEST(Board, AnOverlayThatWeDoNotHaveIsRefused) {
+  std::string text = text_of(kBoards + "robotics_cape_mbbr.toml");
+  text.replace(text.find("\"cape\""), 6, "\"green\"");
+  EXPECT_THROW(parse_board(text, "b.toml"), ConfigError);
 }
 
 // What loading this configuration says to a board file with one text replaced.

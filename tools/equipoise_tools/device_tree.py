@@ -189,9 +189,11 @@ def pads_only(root: Node, kept: set[str]) -> str:
         for name in ("compatible", "status"):
             if name in node.properties and not is_group(node):
                 out.append(f'{name} = "{node.text(name)}";')
-        for name in ("#pinctrl-cells", "phandle", "pinctrl-0", "pinctrl-single,pins"):
+        where = ("#address-cells", "#size-cells", "ranges", "reg")  # a device's address
+        for name in (*where, "#pinctrl-cells", "phandle", "pinctrl-0", "pinctrl-single,pins"):
             if name in node.properties and (name != "phandle" or is_group(node)):
-                out.append(f"{name} = <{' '.join(hex(v) for v in node.cells(name))}>;")
+                cells = " ".join(hex(value) for value in node.cells(name))
+                out.append(f"{name} = <{cells}>;" if cells else f"{name};")
         label = f"{labels[node.path]}: " if node.path in labels else ""
         name = node.path.split("/")[-1] or "/"
         body = [f"{indent}\t{line}" for line in out] + inside

@@ -1,11 +1,11 @@
 # Sourced by tools/package: a dpkg database of the target's libraries, for dpkg-shlibdeps in a cross build.
 # shellcheck shell=bash disable=SC2154
 
-# target_dpkg SYSROOT DATABASE: from the packages that tools/sysroot unpacked into SYSROOT; their files are listed
+# target_dpkg SUITE SYSROOT DATABASE: from the packages that tools/sysroot unpacked into SYSROOT; their files are listed
 # where they are now.
 target_dpkg() {
-  local sysroot=$1 database=$2 deb name architecture entry info
-  local archives=("$root"/build/apt/bookworm-armhf/cache/archives/*.deb)
+  local suite=$1 sysroot=$2 database=$3 deb name architecture entry info
+  local archives=("$root/build/apt/$suite"-armhf/cache/archives/*.deb)
   [ -e "${archives[0]}" ] || die "the packages of $sysroot are gone; run tools/sysroot again after rm -r $sysroot"
   rm -rf "$database"
   mkdir -p "$database/info" "$database/updates"

@@ -29,7 +29,7 @@ collect_module_sources() {
   mkdir -p "$modules_built"
   cp "$drivers"/counter/counter-{core,sysfs,chrdev}.c "$drivers"/counter/counter-*.h "$modules_built/"
   cp "$drivers"/gpio/gpio-sim.c "$drivers"/gpio/gpiolib.h "$modules_built/"
-  cp "$vm/source-bookworm/kernel/irq/irq_sim.c" "$modules_built/"
+  cp "$vm/source-bookworm/kernel/irq/irq_sim.c" "$drivers/watchdog/i6300esb.c" "$modules_built/"
   cp "$root"/tests/hardware/kernel/{Kbuild,*.[ch]} "$modules_built/"
   # What irq_sim calls is exported to built-in code only; this is its exported equivalent.
   sed -i 's/handle_simple_irq(irq_to_desc(irqnum))/generic_handle_irq(irqnum)/' "$modules_built/irq_sim.c"
@@ -51,6 +51,31 @@ build_modules() {
   collect_module_sources
   make_target_modules "$modules_built"
   printf '%s\n' "$wanted" >"$stamp"
+}
+
+# run_hang SECONDS TIMEOUT: a machine whose kernel is made to hang, with QEMU's watchdog set to TIMEOUT by a program; the
+# console is on stdout, and at its end how it ended.
+run_hang() {
+  local seconds=$1 asked=$2 status=0
+  timeout "$seconds" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 256 -nographic -no-reboot -net none \
+    -icount shift=0,sleep=off -device i6300esb -action watchdog=reset \
+    -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/hang-initramfs.gz" \
+    -append "console=ttyAMA0 quiet panic=-1 watchdog=$asked" </dev/null >"$vm/console-hang.raw" || status=$?
+  cat "$vm/console-hang.raw"
+  judge_hang "$status" "$asked" <"$vm/console-hang.raw"
+}
+
+# judge_hang STATUS TIMEOUT: of the machine and its console on stdin. It hung, and was reset in the watchdog's time.
+judge_hang() {
+  local hung
+  hung=$(tr -d '\r' | sed -n 's/^HUNG //p' | tail -n 1)
+  echo "VM: running the hang's judgement"
+  if [ "$1" -eq 0 ] && [ -n "$hung" ] && [ "$hung" -le "$2" ]; then
+    printf '[       OK ] a kernel that hangs is reset within %s s\n[==========] 1 test ran.\n[  PASSED  ] 1 test.\n' "$2"
+  else
+    printf '[  FAILED  ] reset within %s s: hung for %s s, QEMU ended with %s\n[==========] 1 test ran.\n 1 FAILED TEST\n' \
+      "$2" "${hung:-no}" "$1"
+  fi
 }
 
 # run_machine SECONDS ARGUMENTS: boots; the arguments go to tests/hardware/init. The console is on stdout.

@@ -36,6 +36,7 @@ prepare_source() {
   source=$vm/source-$suite
   stamp=$source.stamp
   parts=('drivers/gpio/*.[ch]' 'kernel/irq/irq_sim.c' 'drivers/counter/*.[ch]'
+    'drivers/watchdog/i6300esb.c'
     'drivers/net/can/sja1000/*.h' 'arch/arm/boot/dts/*am33*' 'arch/arm/boot/dts/*tps65217*' 'include/dt-bindings/*'
     'include/uapi/linux/input-event-codes.h')
   [ "$(cat "$stamp" 2>/dev/null)" != "${parts[*]}" ] || return 0

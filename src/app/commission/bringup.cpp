@@ -8,14 +8,14 @@
 #include "app/cli/commands.hpp"
 #include "app/commission/calibrate_imu.hpp"
 #include "app/commission/calibrate_wheels.hpp"
-#include "app/commission/workbench.hpp"
+#include "app/commission/commissioning.hpp"
 #include "app/doctor/doctor.hpp"
 
 namespace equipoise::app {
 namespace {
 
 struct Arguments {
-  WorkbenchArguments bench;
+  CommissioningArguments commissioning;
   std::string out = "board.toml";
   bool force = false;
   std::string json;
@@ -23,9 +23,9 @@ struct Arguments {
 
 void say(const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); }
 
-void refuse_ill_machine(const Workbench& bench, const std::string& board_path) {
+void refuse_ill_machine(const Commissioning& commissioning, const std::string& board_path) {
   doctor::Patient patient;
-  patient.board = &bench.board();
+  patient.board = &commissioning.board();
   patient.board_path = board_path;
   const doctor::Findings findings = doctor::examine(patient);
   for (const doctor::Finding& f : findings.all()) {
@@ -34,34 +34,34 @@ void refuse_ill_machine(const Workbench& bench, const std::string& board_path) {
   }
 }
 
-std::vector<WheelFinding> pulse_all(Workbench& bench) {
-  const auto session = bench.open();
-  session->ask({Request::kUpright,
-                "hang the robot up by its head or lay it on soft foam, wheels free; they will turn a little. "
-                "Then press Enter"});
+std::vector<WheelFinding> pulse_all(Commissioning& commissioning) {
+  const auto manual = commissioning.open();
+  manual->ask({Request::kUpright,
+               "hang the robot up by its head or lay it on soft foam, wheels free; they will turn a little. "
+               "Then press Enter"});
   std::vector<WheelFinding> findings;
-  findings.reserve(static_cast<std::size_t>(bench.layout().wheels));
-  for (int i = 0; i < bench.layout().wheels; ++i)
-    findings.push_back(pulse(*session, bench.layout(), bench.calibration(), i));
-  settle(*session, bench.layout(), &findings);
+  findings.reserve(static_cast<std::size_t>(commissioning.layout().wheels));
+  for (int i = 0; i < commissioning.layout().wheels; ++i)
+    findings.push_back(pulse(*manual, commissioning.layout(), commissioning.calibration(), i));
+  settle(*manual, commissioning.layout(), &findings);
   for (const WheelFinding& f : findings) say("  " + describe(f));
   return findings;
 }
 
-CalibrationFile measure_gyro(Workbench& bench) {
-  const auto session = bench.open();
-  session->ask({Request::kUpright, "put the robot down, hands off, then press Enter"});
-  const Stillness still = session->hold_still(3.0);
-  const GyroBias bias = gyro_bias(still, bench.calibration());
+CalibrationFile measure_gyro(Commissioning& commissioning) {
+  const auto manual = commissioning.open();
+  manual->ask({Request::kUpright, "put the robot down, hands off, then press Enter"});
+  const Stillness still = manual->hold_still(3.0);
+  const GyroBias bias = gyro_bias(still, commissioning.calibration());
   CalibrationFile file;
-  file.robot = bench.robot();
-  file.wheel_count = bench.layout().wheels;
+  file.robot = commissioning.robot();
+  file.wheel_count = commissioning.layout().wheels;
   file.gyro = {stamp_of(still.temperature_degC), bias.bias_S_rad_s, bias.sigma_S_rad_s};
   return file;
 }
 
 int run_bringup(const Arguments& a) {
-  Workbench bench(a.bench);
+  Commissioning commissioning(a.commissioning);
   const auto folder = std::filesystem::path(a.out).parent_path();
   const std::string calibration_name = std::filesystem::path(a.out).stem().string() + "-calibration.toml";
   const std::string calibration_path = (folder / calibration_name).string();
@@ -69,22 +69,23 @@ int run_bringup(const Arguments& a) {
     if (std::filesystem::exists(path) && !a.force)
       throw InputError(path + ": exists; give another --out, or --force to replace it");
   }
-  if (!bench.practice()) {
+  if (!commissioning.on_stand()) {
     say("1 of 4: the machine");
-    refuse_ill_machine(bench, a.bench.board);
+    refuse_ill_machine(commissioning, a.commissioning.board);
   }
   say("2 of 4: at rest");
-  const CalibrationFile calibration = measure_gyro(bench);
+  const CalibrationFile calibration = measure_gyro(commissioning);
 
   say("3 of 4: motors, encoders, wheels");
-  const std::vector<WheelFinding> findings = pulse_all(bench);
+  const std::vector<WheelFinding> findings = pulse_all(commissioning);
   const std::string wrong = complaint(findings);
-  const std::string text = with_calibration(rewired(read_text(a.bench.board), findings), calibration_name);
+  const std::string text =
+      with_calibration(rewired(read_text(a.commissioning.board), findings), calibration_name);
   const Board corrected = parse_board(text, a.out);
   if (!wrong.empty()) {
     say("  corrected: " + wrong + "; 4 of 4: again, with the corrected board file");
-    bench.change_board(corrected);
-    const std::string still_wrong = complaint(pulse_all(bench));
+    commissioning.change_board(corrected);
+    const std::string still_wrong = complaint(pulse_all(commissioning));
     if (!still_wrong.empty())
       throw JobError("after the correction: " + still_wrong + "; nothing was written");
   }
@@ -93,7 +94,7 @@ int run_bringup(const Arguments& a) {
   std::fprintf(a.json == "-" ? stderr : stdout,
                "%s\nwritten to %s and %s\nnext: equipoise calibrate accel --config %s --board %s --out %s\n",
                wrong.empty() ? "wired as the board file says" : ("corrected: " + wrong).c_str(),
-               a.out.c_str(), calibration_path.c_str(), a.bench.config.c_str(), a.out.c_str(),
+               a.out.c_str(), calibration_path.c_str(), a.commissioning.config.c_str(), a.out.c_str(),
                calibration_path.c_str());
   if (!a.json.empty())
     write_json({{"board", a.out}, {"calibration", calibration_path}, {"corrected", wrong}}, a.json);
@@ -106,7 +107,7 @@ void add_bringup(Subcommand app) {
   const Subcommand command = app.subcommand(
       "bringup", "First power-up, guided: tiny pulses on the stand find the wiring, a board file comes out");
   auto a = std::make_shared<Arguments>();
-  add_options(command, &a->bench);
+  add_options(command, &a->commissioning);
   command.option("--out", a->out, "board file to write; its calibration goes beside it").show_default();
   command.flag("--force", a->force, "replace existing files");
   command.option("--json", a->json, "result as JSON, - for stdout");

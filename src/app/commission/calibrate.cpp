@@ -7,7 +7,7 @@
 #include "app/cli/commands.hpp"
 #include "app/commission/calibrate_imu.hpp"
 #include "app/commission/calibrate_wheels.hpp"
-#include "app/commission/workbench.hpp"
+#include "app/commission/commissioning.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -19,7 +19,7 @@ constexpr int kTurns = 5;
 constexpr double kMaxCountsError = 0.02;
 
 struct Arguments {
-  WorkbenchArguments bench;
+  CommissioningArguments commissioning;
   std::string what;
   std::string out = "calibration.toml";
   std::string json;
@@ -39,10 +39,10 @@ std::string format(const char* text, Args... args) {
   return out;
 }
 
-Result calibrate_gyro(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
-  const auto session = bench.open();
-  const Stillness still = session->hold_still(kGyro_s);
-  const GyroBias found = gyro_bias(still, bench.calibration());
+Result calibrate_gyro(Commissioning& commissioning, CalibrationFile* file, nlohmann::json* json) {
+  const auto manual = commissioning.open();
+  const Stillness still = manual->hold_still(kGyro_s);
+  const GyroBias found = gyro_bias(still, commissioning.calibration());
   file->gyro = {stamp_of(still.temperature_degC), found.bias_S_rad_s, found.sigma_S_rad_s};
   const Vec3 deg = found.bias_S_rad_s * 180.0 / kPi;
   *json = {{"bias_rad_s", json_of(found.bias_S_rad_s)}, {"sigma_rad_s", json_of(found.sigma_S_rad_s)}};
@@ -52,27 +52,27 @@ Result calibrate_gyro(Workbench& bench, CalibrationFile* file, nlohmann::json* j
 }
 
 /// Specific force of a pose, nominal scale, sensor axes; JobError when the robot is not still.
-Vec3 pose(Session& session, const Calibration& c, double* temperature_degC) {
-  const Stillness still = session.hold_still(kPose_s);
+Vec3 pose(ManualDrive& manual, const Calibration& c, double* temperature_degC) {
+  const Stillness still = manual.hold_still(kPose_s);
   (void)gyro_bias(still, c);  // refuses motion
   *temperature_degC = still.temperature_degC;
   return c.accel_m_s2_per_count * still.accel;
 }
 
-Result calibrate_accel(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
-  const auto session = bench.open();
+Result calibrate_accel(Commissioning& commissioning, CalibrationFile* file, nlohmann::json* json) {
+  const auto manual = commissioning.open();
   std::vector<Vec3> poses;
   std::array<bool, 6> seen{};
   double temperature = 0.0;
   for (int tries = 0; tries < kMaxPoses && poses.size() < seen.size(); ++tries) {
     int next = 0;
     while (seen[static_cast<std::size_t>(next)]) ++next;
-    session->ask({Request::kFaceUp,
-                  std::string("put the robot down with the IMU's ") +
-                      kFaceNames[static_cast<std::size_t>(next)] +
-                      " side up (or any other side not seen yet), hands off, then press Enter",
-                  next});
-    const Vec3 accel = pose(*session, bench.calibration(), &temperature);
+    manual->ask({Request::kFaceUp,
+                 std::string("put the robot down with the IMU's ") +
+                     kFaceNames[static_cast<std::size_t>(next)] +
+                     " side up (or any other side not seen yet), hands off, then press Enter",
+                 next});
+    const Vec3 accel = pose(*manual, commissioning.calibration(), &temperature);
     const int face = face_up(accel);
     if (face < 0 || seen[static_cast<std::size_t>(face)]) {
       std::fprintf(stderr,
@@ -86,8 +86,8 @@ Result calibrate_accel(Workbench& bench, CalibrationFile* file, nlohmann::json* 
   }
   Vec3 check = Vec3::UnitX() * kGravity_m_s2;
   if (poses.size() == seen.size()) {
-    session->ask({Request::kTip, "lean the robot against something, on no side, then press Enter"});
-    check = pose(*session, bench.calibration(), &temperature);
+    manual->ask({Request::kTip, "lean the robot against something, on no side, then press Enter"});
+    check = pose(*manual, commissioning.calibration(), &temperature);
   }
   const AccelFit fit = fit_six_faces(poses, check);
   file->accel = {stamp_of(temperature), fit.scale_S, fit.bias_S_m_s2, fit.check_error_m_s2};
@@ -107,20 +107,21 @@ Result calibrate_accel(Workbench& bench, CalibrationFile* file, nlohmann::json* 
       mg < 15.0 ? "" : "the fit is poor: repeat it on a firm table"};
 }
 
-Result calibrate_mount(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
-  const auto session = bench.open();
+Result calibrate_mount(Commissioning& commissioning, CalibrationFile* file, nlohmann::json* json) {
+  const auto manual = commissioning.open();
   double temperature = 0.0;
   const auto corrected = [&](const Vec3& a) {
     return file->accel ? Vec3(file->accel->scale.cwiseProduct(a) - file->accel->bias_m_s2) : a;
   };
-  session->ask({Request::kUpright, "stand the robot exactly upright, hands off, then press Enter"});
-  const Vec3 upright = corrected(pose(*session, bench.calibration(), &temperature));
-  session->ask({Request::kTip, bench.tip_words() + ", lean it there, then press Enter"});
-  const Vec3 tipped = corrected(pose(*session, bench.calibration(), &temperature));
-  const Mat3 R_BS = mount_rotation(upright, tipped, bench.setup().tip_axis_B);
+  manual->ask({Request::kUpright, "stand the robot exactly upright, hands off, then press Enter"});
+  const Vec3 upright = corrected(pose(*manual, commissioning.calibration(), &temperature));
+  manual->ask({Request::kTip, commissioning.tip_words() + ", lean it there, then press Enter"});
+  const Vec3 tipped = corrected(pose(*manual, commissioning.calibration(), &temperature));
+  const Mat3 R_BS = mount_rotation(upright, tipped, commissioning.setup().tip_axis_B);
   file->mount = {stamp_of(temperature), R_BS};
   const double off =
-      std::acos(std::clamp(0.5 * ((R_BS * bench.calibration().R_BS.transpose()).trace() - 1.0), -1.0, 1.0)) *
+      std::acos(std::clamp(0.5 * ((R_BS * commissioning.calibration().R_BS.transpose()).trace() - 1.0), -1.0,
+                           1.0)) *
       180.0 / kPi;
   nlohmann::json rows = nlohmann::json::array();
   for (int i = 0; i < 9; ++i) rows.push_back(R_BS(i / 3, i % 3));
@@ -128,14 +129,14 @@ Result calibrate_mount(Workbench& bench, CalibrationFile* file, nlohmann::json* 
   return {format("the IMU sits %.1f degrees from where the board file says", off), ""};
 }
 
-Result calibrate_motors(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
-  const auto session = bench.open();
-  const double temperature = session->hold_still(0.1).temperature_degC;
+Result calibrate_motors(Commissioning& commissioning, CalibrationFile* file, nlohmann::json* json) {
+  const auto manual = commissioning.open();
+  const double temperature = manual->hold_still(0.1).temperature_degC;
   std::vector<WheelFinding> findings;
-  findings.reserve(static_cast<std::size_t>(bench.layout().wheels));
-  for (int i = 0; i < bench.layout().wheels; ++i)
-    findings.push_back(pulse(*session, bench.layout(), bench.calibration(), i));
-  settle(*session, bench.layout(), &findings);
+  findings.reserve(static_cast<std::size_t>(commissioning.layout().wheels));
+  for (int i = 0; i < commissioning.layout().wheels; ++i)
+    findings.push_back(pulse(*manual, commissioning.layout(), commissioning.calibration(), i));
+  settle(*manual, commissioning.layout(), &findings);
   Result result;
   CalibrationFile::Motors motors{stamp_of(temperature), {}, {}, {}};
   (*json)["motors"] = nlohmann::json::array();
@@ -157,13 +158,13 @@ Result calibrate_motors(Workbench& bench, CalibrationFile* file, nlohmann::json*
   return result;
 }
 
-Result calibrate_encoders(Workbench& bench, CalibrationFile* file, nlohmann::json* json) {
-  const auto session = bench.open();
-  CalibrationFile::Encoders encoders{stamp_of(session->hold_still(0.1).temperature_degC), {}};
+Result calibrate_encoders(Commissioning& commissioning, CalibrationFile* file, nlohmann::json* json) {
+  const auto manual = commissioning.open();
+  CalibrationFile::Encoders encoders{stamp_of(manual->hold_still(0.1).temperature_degC), {}};
   Result result;
-  for (int wheel = 0; wheel < bench.layout().wheels; ++wheel) {
-    const EncoderFinding found = turn_by_hand(*session, bench.layout(), wheel, kTurns);
-    const double expected = bench.layout().counts_per_rev;
+  for (int wheel = 0; wheel < commissioning.layout().wheels; ++wheel) {
+    const EncoderFinding found = turn_by_hand(*manual, commissioning.layout(), wheel, kTurns);
+    const double expected = commissioning.layout().counts_per_rev;
     encoders.counts_per_rev.push_back(found.counts_per_rev);
     result.text += (wheel == 0 ? "" : "\n") + format("wheel %d: encoder %d, %.1f counts per turn", wheel + 1,
                                                      found.encoder + 1, found.counts_per_rev);
@@ -184,17 +185,17 @@ Result calibrate_encoders(Workbench& bench, CalibrationFile* file, nlohmann::jso
 }
 
 int run_calibrate(const Arguments& a) {
-  Workbench bench(a.bench);
+  Commissioning commissioning(a.commissioning);
   CalibrationFile file;
-  if (std::filesystem::exists(a.out)) file = load_calibration(a.out, bench.robot());
-  file.robot = bench.robot();
-  file.wheel_count = bench.layout().wheels;
+  if (std::filesystem::exists(a.out)) file = load_calibration(a.out, commissioning.robot());
+  file.robot = commissioning.robot();
+  file.wheel_count = commissioning.layout().wheels;
   nlohmann::json json;
-  const Result result = a.what == "gyro"     ? calibrate_gyro(bench, &file, &json)
-                        : a.what == "accel"  ? calibrate_accel(bench, &file, &json)
-                        : a.what == "mount"  ? calibrate_mount(bench, &file, &json)
-                        : a.what == "motors" ? calibrate_motors(bench, &file, &json)
-                                             : calibrate_encoders(bench, &file, &json);
+  const Result result = a.what == "gyro"     ? calibrate_gyro(commissioning, &file, &json)
+                        : a.what == "accel"  ? calibrate_accel(commissioning, &file, &json)
+                        : a.what == "mount"  ? calibrate_mount(commissioning, &file, &json)
+                        : a.what == "motors" ? calibrate_motors(commissioning, &file, &json)
+                                             : calibrate_encoders(commissioning, &file, &json);
   save_calibration(file, a.out);
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   std::fprintf(out, "%s\nwritten to %s\n", result.text.c_str(), a.out.c_str());
@@ -219,7 +220,7 @@ void add_calibrate(Subcommand app) {
               "motors: which wheel each turns and which way; encoders: counts per turn, by hand")
       .required()
       .one_of({"gyro", "accel", "mount", "motors", "encoders"});
-  add_options(command, &a->bench);
+  add_options(command, &a->commissioning);
   command.option("--out", a->out, "calibration file to add to").show_default();
   command.option("--json", a->json, "result as JSON, - for stdout");
   command.action([=] { return run_calibrate(*a); });

@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "app/commission/session.hpp"
+#include "app/commission/manual_drive.hpp"
 #include "equipoise/sense/calibrate.hpp"
 
 namespace equipoise::app {

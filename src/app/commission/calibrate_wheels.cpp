@@ -53,16 +53,55 @@ std::array<double, kMaxMotors> only(const WheelLayout& layout, int motor, double
   return duties;
 }
 
+/// One dead phase of an encoder: its count goes one up and one down for ever, however far the wheel turns.
+class DeadPhase {
+ public:
+  explicit DeadPhase(const RawSample& start) : first_(start), last_(start) {}
+
+  void look(const RawSample& raw) {
+    for (std::size_t i = 0; i < kMaxMotors; ++i) {
+      if (raw.encoder_counts[i] != last_.encoder_counts[i]) ++changes_[i];
+      reach_[i] = std::max(reach_[i], std::abs(raw.encoder_counts[i] - first_.encoder_counts[i]));
+    }
+    last_ = raw;
+  }
+  /// From 0; -1: none that changed so often.
+  int encoder(int changes) const {
+    for (std::size_t i = 0; i < kMaxMotors; ++i) {
+      if (changes_[i] >= changes && reach_[i] <= 1.0) return static_cast<int>(i);
+    }
+    return -1;
+  }
+
+ private:
+  RawSample first_, last_;
+  std::array<int, kMaxMotors> changes_{};
+  std::array<double, kMaxMotors> reach_{};
+};
+
 /// Raises the duty until a wheel turns; fills duty, encoder, counts_down.
-void find_breakaway(Session& session, const WheelLayout& layout, WheelFinding* finding) {
-  const RawSample start = session.sample();
+void find_breakaway(ManualDrive& manual, const WheelLayout& layout, WheelFinding* finding) {
+  const RawSample start = manual.sample();
+  DeadPhase dead_phase(start);
   const int ticks = static_cast<int>(std::lround(kRamp_s * kTickHz));
   for (int tick = 1; tick <= ticks; ++tick) {
     finding->drive = kMaxDrive * tick / ticks;
-    const auto turns = travel(start, session.drive(only(layout, finding->motor, finding->drive)), layout);
+    const RawSample raw = manual.drive(only(layout, finding->motor, finding->drive));
+    dead_phase.look(raw);
+    // Hums on its gear's play change a count now and then: wait for the ramp's end, unless the wheel surely
+    // spins.
+    constexpr int kHums = 6, kSpins = 30;
+    if (const int encoder = dead_phase.encoder(tick == ticks ? kHums : kSpins); encoder >= 0) {
+      manual.off();
+      throw JobError(format(
+          "motor %d: encoder %d counts one up and one down for ever: one of its two phases is dead; check "
+          "its A and B wires, one at a time",
+          finding->motor + 1, encoder + 1));
+    }
+    const auto turns = travel(start, raw, layout);
     const std::size_t most = largest(turns);
     if (std::abs(turns[most]) < kMoved_turns) continue;
-    session.off();
+    manual.off();
     for (std::size_t i = 0; i < turns.size(); ++i) {
       if (i != most && std::abs(turns[i]) > kShareOfOthers * std::abs(turns[most])) {
         throw JobError(
@@ -75,7 +114,7 @@ void find_breakaway(Session& session, const WheelLayout& layout, WheelFinding* f
     finding->counts_down = turns[most] < 0.0;
     return;
   }
-  session.off();
+  manual.off();
   throw JobError(
       format("motor %d: no encoder moves up to %.0f %% torque: battery, motor plug, encoder plug, or the "
              "wheel is held",
@@ -88,35 +127,36 @@ struct Kick {
 };
 
 /// Shakes the wheel forth, back, back and forth, and regresses the gyro on the wheel's rate.
-Kick shake(Session& session, const WheelLayout& layout, const Calibration& c, const WheelFinding& finding) {
+Kick shake(ManualDrive& manual, const WheelLayout& layout, const Calibration& c,
+           const WheelFinding& finding) {
   constexpr std::array<double, 4> kSense{1.0, -1.0, -1.0, 1.0};
-  const Stillness rest = session.hold_still(0.5);
+  const Stillness rest = manual.hold_still(0.5);
   const Vec3 bias = c.R_BS * (c.gyro_rad_s_per_count * rest.gyro);
   const double sigma =
       c.gyro_rad_s_per_count * std::max(rest.gyro_sigma.norm(), 0.5);  // half a count at least
   const double drive = std::min(1.6 * finding.drive, kMaxDrive);
   const double rad_per_count = (finding.counts_down ? -2.0 : 2.0) * kPi / layout.counts_per_rev;
   const auto k = static_cast<std::size_t>(finding.encoder);
-  const RawSample start = session.sample();
+  const RawSample start = manual.sample();
   double last = start.encoder_counts[k];
   double rate_squares = 0.0;
   Vec3 products = Vec3::Zero();
   for (const double sense : kSense) {
     for (int i = 0; i < kStroke_ticks; ++i) {
-      const RawSample raw = session.drive(only(layout, finding.motor, sense * drive));
+      const RawSample raw = manual.drive(only(layout, finding.motor, sense * drive));
       const Vec3 gyro = gyro_of(raw, c) - bias;
       const double rate = rad_per_count * (raw.encoder_counts[k] - last) * kTickHz;
       last = raw.encoder_counts[k];
       rate_squares += rate * rate;
       products += rate * gyro;
       if (gyro.norm() > kMaxBodyRate_rad_s || std::abs(travel(start, raw, layout)[k]) > kMaxTravel_turns) {
-        session.off();
+        manual.off();
         throw JobError(format("motor %d: the robot swings at %.1f rad/s or its wheel ran off; hold it better",
                               finding.motor + 1, gyro.norm()));
       }
     }
   }
-  session.off();
+  manual.off();
   Kick kick;
   if (rate_squares > 0.0) {
     kick.share_B = products / rate_squares;
@@ -180,24 +220,25 @@ WheelLayout layout_of(const MipParameters& robot, const MotorParameters& motor,
   return layout;
 }
 
-WheelFinding pulse(Session& session, const WheelLayout& layout, const Calibration& calibration, int motor) {
+WheelFinding pulse(ManualDrive& manual, const WheelLayout& layout, const Calibration& calibration,
+                   int motor) {
   WheelFinding finding;
   finding.motor = motor;
-  find_breakaway(session, layout, &finding);
-  session.rest(0.5);
-  judge(layout, shake(session, layout, calibration, finding), &finding);
-  session.rest(0.3);
+  find_breakaway(manual, layout, &finding);
+  manual.rest(0.5);
+  judge(layout, shake(manual, layout, calibration, finding), &finding);
+  manual.rest(0.3);
   return finding;
 }
 
-void settle(Session& session, const WheelLayout& layout, std::vector<WheelFinding>* findings) {
+void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFinding>* findings) {
   for (WheelFinding& f : *findings) {
     if (f.wheel && f.turns_backwards) continue;
     std::string question = format("motor %d moved encoder %d", f.motor + 1, f.encoder + 1);
     question += f.wheel ? "" : format("; which wheel turned (1 to %d)", layout.wheels);
     question += f.turns_backwards ? ", first forwards or backwards (already felt; f)"
                                   : ", and which way first: forwards or backwards (f, b)";
-    const std::string answer = session.ask(
+    const std::string answer = manual.ask(
         {Request::kLookAtWheel, question + "? e.g. \"" + std::to_string(f.motor + 1) + " f\"", f.motor});
     int wheel = 0;
     char way = 0;
@@ -240,12 +281,12 @@ std::string complaint(const std::vector<WheelFinding>& findings) {
   return text;
 }
 
-EncoderFinding turn_by_hand(Session& session, const WheelLayout& layout, int wheel, int turns) {
-  const RawSample start = session.sample();
-  session.ask({Request::kTurnWheel,
-               format("turn wheel %d forwards by %d whole turns, then press Enter", wheel + 1, turns), wheel,
-               turns});
-  const auto moved = travel(start, session.sample(), layout);
+EncoderFinding turn_by_hand(ManualDrive& manual, const WheelLayout& layout, int wheel, int turns) {
+  const RawSample start = manual.sample();
+  manual.ask({Request::kTurnWheel,
+              format("turn wheel %d forwards by %d whole turns, then press Enter", wheel + 1, turns), wheel,
+              turns});
+  const auto moved = travel(start, manual.sample(), layout);
   const std::size_t most = largest(moved);
   if (std::abs(moved[most]) < 0.5)
     throw JobError(format("no encoder moved when wheel %d was turned: check its plug", wheel + 1));

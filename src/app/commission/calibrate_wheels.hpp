@@ -1,5 +1,5 @@
 // Which motor turns which wheel, which encoder counts it, and which way, by tiny pulses on the stand.
-// In: session, how the wheels sit in the body -> out: one finding per motor of the board file, and the wiring
+// In: manual, how the wheels sit in the body -> out: one finding per motor of the board file, and the wiring
 // that follows from them. Bounded: at most 0.35 of the stall torque, 0.6 s and half a turn per try; motors
 // off afterwards. The body must be free to rock a little (hung up, or on soft foam): then it kicks back when
 // a wheel spins up, and the gyro tells which wheel it was and which way it turned.
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "app/board/board.hpp"
-#include "app/commission/session.hpp"
+#include "app/commission/manual_drive.hpp"
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "robots/mbbr/mbbr.hpp"
@@ -46,10 +46,10 @@ struct WheelFinding {
 };
 
 /// JobError when nothing moves, several wheels move, or the robot does.
-WheelFinding pulse(Session& session, const WheelLayout& layout, const Calibration& calibration, int motor);
+WheelFinding pulse(ManualDrive& manual, const WheelLayout& layout, const Calibration& calibration, int motor);
 
 /// For every motor: where `findings` leave a question, the person answers it.
-void settle(Session& session, const WheelLayout& layout, std::vector<WheelFinding>* findings);
+void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFinding>* findings);
 
 /// In words, one line per motor.
 std::string describe(const WheelFinding& finding);
@@ -62,6 +62,6 @@ struct EncoderFinding {
 };
 
 /// By hand, motors off: the person turns wheel `wheel` forwards by `turns` whole turns.
-EncoderFinding turn_by_hand(Session& session, const WheelLayout& layout, int wheel, int turns);
+EncoderFinding turn_by_hand(ManualDrive& manual, const WheelLayout& layout, int wheel, int turns);
 
 }  // namespace equipoise::app

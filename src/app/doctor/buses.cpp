@@ -100,7 +100,15 @@ void examine_dmp(const Patient& patient, Findings* findings) {
                    path + ": " + (error ? error.message() : std::to_string(size) + " bytes, not 3062"),
                    "ls -l " + path + "  # correct [imu] dmp_firmware, or set it to \"\" for our own filter");
   } else {
-    findings->ok("imu.dmp", path + " has the right size");
+    const int range_g = patient.board->wiring.imu.accel_range_g;
+    if (range_g == 2 || range_g == 8) {
+      findings->ok("imu.dmp", path + " has the right size; accelerometer at " + std::to_string(range_g) +
+                                  (range_g == 2 ? " g, as InvenSense's driver sets it"
+                                                : " g, as librobotcontrol sets it since 0.4.0"));
+    } else {
+      findings->fail("imu.dmp", "the DMP runs at 2 or 8 g, not at " + std::to_string(range_g),
+                     "set [imu] accel_range_g = 8 in " + patient.board_path);
+    }
   }
 }
 

@@ -81,6 +81,9 @@ void examine_line(const Patient& patient, Findings* findings, const Line& line) 
   const std::string holder = holder_of(device, line.line);
   if (holder == kOurs) {
     findings->warn(name, line.use + ": held by a running equipoise", "sudo systemctl stop equipoise");
+  } else if (line.use.rfind("[leds]", 0) == 0 &&
+             access(patient.path("/sys/class/leds/" + holder).c_str(), F_OK) == 0 && !holder.empty()) {
+    findings->ok(name, line.use + ": the kernel's LED " + holder);
   } else if (!holder.empty()) {
     findings->fail(name, line.use + ": held by \"" + holder + "\"", overlay_fix(patient));
   } else {

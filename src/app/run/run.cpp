@@ -80,6 +80,8 @@ int run_board(const RunArguments& a, const Board& board, const std::string& boar
     throw std::runtime_error(a.board + ": self-test: " + broken);
   }
   StatusIndicator indicator(board);
+  Panel panel(board);
+  runner.obey(&panel);
   Outcome outcome = runner.run(io, 1, &indicator, [&](const auto& log_failed) -> runtime::Supervisor& {
     return session.begin(log_failed);
   });

@@ -8,6 +8,7 @@
 
 #include "app/cli/key_file.hpp"
 #include "app/io/hardware.hpp"
+#include "app/run/panel.hpp"
 #include "app/run/run_arguments.hpp"
 #include "app/run/service_notify.hpp"
 #include "app/run/wires.hpp"
@@ -58,13 +59,16 @@ class Runner {
 
   const Calibration& calibration() const { return config_.calibration; }
   const std::string& sha256() const { return loaded_.sha256; }
+  void obey(Panel* panel) { panel_ = panel; }
 
   Outcome run(rio_t io, int number, StatusIndicator* indicator, const BeginSupervision& begin) {
     runtime::Telemetry telemetry(telemetry_options(number));
     ServiceNotify service;
     const auto commands = [&](std::int64_t tick, std::int64_t) {
       service.note(tick);
-      return receiver_ ? receiver_->latest() : run_script(a_, static_cast<double>(tick) * kTickS);
+      const Command asked =
+          receiver_ ? receiver_->latest() : run_script(a_, static_cast<double>(tick) * kTickS);
+      return panel_ != nullptr ? panel_->limit(asked) : asked;
     };
     Hardware hardware(io);
     const Trial trial = Firmware::with_pipeline(config_, a_.choice.controller, [&](auto& pipeline) {
@@ -123,6 +127,7 @@ class Runner {
   typename Firmware::Config config_;
   std::string board_toml_;
   std::unique_ptr<runtime::CommandReceiver> receiver_;  // null: the script
+  Panel* panel_ = nullptr;                              // null: no buttons
 };
 
 }  // namespace equipoise::app

@@ -1,4 +1,4 @@
-#include "app/commission/practice.hpp"
+#include "app/commission/simulated_stand.hpp"
 
 #include <Eigen/Geometry>
 #include <cstdio>
@@ -31,8 +31,8 @@ bool one_of(const std::string& text, const char* pattern, int wheels, std::size_
 
 }  // namespace
 
-PracticeFaults parse_faults(const std::vector<std::string>& names, int wheels) {
-  PracticeFaults faults;
+StandFaults parse_faults(const std::vector<std::string>& names, int wheels) {
+  StandFaults faults;
   Miswiring& w = faults.wiring;
   for (const std::string& name : names) {
     std::size_t a = 0, b = 0;
@@ -57,12 +57,12 @@ PracticeFaults parse_faults(const std::vector<std::string>& names, int wheels) {
   return faults;
 }
 
-PracticeRobot::PracticeRobot(const PracticeSetup& setup, const PracticeFaults& faults)
+SimulatedStand::SimulatedStand(const StandSetup& setup, const StandFaults& faults)
     : setup_(setup), faults_(faults) {
   build();
 }
 
-void PracticeRobot::build() {
+void SimulatedStand::build() {
   StandParams stand;
   stand.wheels = setup_.layout.wheels;
   stand.axis_B = setup_.layout.axis_B;
@@ -75,14 +75,14 @@ void PracticeRobot::build() {
   if (faults_.moving) world_->shake_by_hand({0.0, 0.0, 30.0 * kPi / 180.0});
 }
 
-void PracticeRobot::put_face_up(int face) {
+void SimulatedStand::put_face_up(int face) {
   Vec3 up_S = Vec3::Zero();
   up_S(face % 3) = face < 3 ? 1.0 : -1.0;
   const Vec3 up_B = setup_.calibration.R_BS * up_S;
   world_->put(Eigen::Quaterniond::FromTwoVectors(up_B, Vec3::UnitZ()).toRotationMatrix());
 }
 
-Ask PracticeRobot::ask() {
+Ask SimulatedStand::ask() {
   return [this](const Request& request, std::string* answer) {
     std::fprintf(stderr, "%s\n", request.text.c_str());
     const auto index = static_cast<std::size_t>(request.index);
@@ -109,7 +109,7 @@ Ask PracticeRobot::ask() {
   };
 }
 
-void PracticeRobot::rewire(const Board& from, const Board& to) {
+void SimulatedStand::rewire(const Board& from, const Board& to) {
   const Miswiring before = faults_.wiring;
   for (std::size_t i = 0; i < to.wiring.motors; ++i) {
     const bbb_motor_t& now = to.wiring.motor[i];

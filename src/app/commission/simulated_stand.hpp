@@ -8,7 +8,7 @@
 
 #include "app/board/board.hpp"
 #include "app/commission/calibrate_wheels.hpp"
-#include "app/commission/session.hpp"
+#include "app/commission/manual_drive.hpp"
 #include "app/io/plant_backend.hpp"
 #include "equipoise/plant/stand_world.hpp"
 
@@ -16,13 +16,13 @@ namespace equipoise::app {
 
 /// "motor-1-reversed", "motor-1-dead", "encoder-2-reversed", "motors-1-2-swapped", "encoders-1-2-swapped",
 /// "moving"; InputError for anything else.
-struct PracticeFaults {
+struct StandFaults {
   Miswiring wiring;
   bool moving = false;
 };
-PracticeFaults parse_faults(const std::vector<std::string>& names, int wheels);
+StandFaults parse_faults(const std::vector<std::string>& names, int wheels);
 
-struct PracticeSetup {
+struct StandSetup {
   WheelLayout layout;
   Vec3 tip_axis_B = Vec3::UnitY();
   MotorParameters motor;
@@ -30,9 +30,9 @@ struct PracticeSetup {
   WorldParams world;
 };
 
-class PracticeRobot {
+class SimulatedStand {
  public:
-  PracticeRobot(const PracticeSetup& setup, const PracticeFaults& faults);
+  SimulatedStand(const StandSetup& setup, const StandFaults& faults);
 
   rio_t io() { return backend_->io(); }
   Ask ask();
@@ -43,8 +43,8 @@ class PracticeRobot {
   void build();
   void put_face_up(int face);
 
-  PracticeSetup setup_;
-  PracticeFaults faults_;
+  StandSetup setup_;
+  StandFaults faults_;
   std::unique_ptr<StandWorld> world_;
   std::unique_ptr<PlantBackend<StandWorld>> backend_;
 };

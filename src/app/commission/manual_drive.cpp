@@ -1,4 +1,4 @@
-#include "app/commission/session.hpp"
+#include "app/commission/manual_drive.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ std::string missing_of(const RawSample& raw) {
 
 }  // namespace
 
-RawSample Session::next() {
+RawSample ManualDrive::next() {
   for (int missed = 0;; ++missed) {
     if (interrupted.load(std::memory_order_relaxed)) throw JobError("interrupted; motors are off");
     std::int64_t now_ns = 0;
@@ -35,29 +35,29 @@ RawSample Session::next() {
   }
 }
 
-int Session::motors_off() noexcept {
+int ManualDrive::motors_off() noexcept {
   if (heartbeat_ != nullptr) heartbeat_->want_enable.store(0, std::memory_order_relaxed);
   return hardware_.motors_off();
 }
 
-void Session::beat() {
+void ManualDrive::beat() {
   if (heartbeat_ == nullptr) return;
   heartbeat_->loop.fetch_add(1, std::memory_order_release);
   if (!guard_.alive(heartbeat_->guard.load(std::memory_order_acquire), runtime::monotonic_now_ns()))
     throw JobError("the guard process has died; motors are off");
 }
 
-void Session::off() {
+void ManualDrive::off() {
   if (motors_off() != 0)
     throw JobError("the motors cannot be switched off: take the battery out, then run equipoise doctor");
 }
 
-RawSample Session::sample() {
+RawSample ManualDrive::sample() {
   off();
   return next();
 }
 
-RawSample Session::drive(const std::array<double, kMaxMotors>& duty) {
+RawSample ManualDrive::drive(const std::array<double, kMaxMotors>& duty) {
   MotorCommand command{};
   std::copy(duty.begin(), duty.end(), command.duty);
   command.enable = true;
@@ -72,11 +72,11 @@ RawSample Session::drive(const std::array<double, kMaxMotors>& duty) {
   }
 }
 
-void Session::rest(double seconds) {
+void ManualDrive::rest(double seconds) {
   for (int i = 0; i < std::lround(seconds * kTickHz); ++i) sample();
 }
 
-Stillness Session::hold_still(double seconds) {
+Stillness ManualDrive::hold_still(double seconds) {
   const int count = static_cast<int>(std::lround(seconds * kTickHz));
   Vec3 gyro_squares = Vec3::Zero(), accel_squares = Vec3::Zero(), first_half = Vec3::Zero();
   std::array<double, kMaxMotors> low{}, high{};
@@ -106,7 +106,7 @@ Stillness Session::hold_still(double seconds) {
   return s;
 }
 
-std::string Session::ask(const Request& request) {
+std::string ManualDrive::ask(const Request& request) {
   off();
   std::string answer;
   if (!ask_(request, &answer)) throw JobError("stopped by the person; nothing was written");

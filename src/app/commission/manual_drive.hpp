@@ -42,14 +42,14 @@ struct Stillness {
   double temperature_degC = 0.0;                    // 0: unknown
 };
 
-class Session {
+class ManualDrive {
  public:
   /// `heartbeat`: of the guard that holds the bridges; nullptr: nobody does.
-  Session(rio_t io, Ask ask, runtime::HeartbeatPage* heartbeat = nullptr)
+  ManualDrive(rio_t io, Ask ask, runtime::HeartbeatPage* heartbeat = nullptr)
       : hardware_(io), io_(io), ask_(std::move(ask)), heartbeat_(heartbeat) {}
-  ~Session() { (void)motors_off(); }
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
+  ~ManualDrive() { (void)motors_off(); }
+  ManualDrive(const ManualDrive&) = delete;
+  ManualDrive& operator=(const ManualDrive&) = delete;
 
   /// Next tick's sample, all of it valid; JobError after a few that are not, or after Ctrl-C.
   RawSample sample();

@@ -1,4 +1,4 @@
-#include "app/commission/workbench.hpp"
+#include "app/commission/commissioning.hpp"
 
 #include <poll.h>
 #include <unistd.h>
@@ -48,17 +48,17 @@ bool ask_person(const Request& request, std::string* answer) {
 
 }  // namespace
 
-void add_options(Subcommand command, WorkbenchArguments* a) {
+void add_options(Subcommand command, CommissioningArguments* a) {
   command.option("--config", a->config, "robot configuration, TOML").required();
   command.option("--board", a->board, "wiring, TOML; see config/boards").required();
   command.option("--backend", a->backend, "board, or stand: a simulated robot to practise on")
       .show_default()
       .one_of({"board", "stand"});
-  command.option("--seed", a->seed, "of the practice robot's sensors").show_default();
-  command.option("--practice-fault", a->faults, "of the practice robot, e.g. motor-1-reversed");
+  command.option("--seed", a->seed, "of the simulated stand's sensors").show_default();
+  command.option("--practice-fault", a->faults, "on the simulated stand, e.g. motor-1-reversed");
 }
 
-Workbench::Workbench(const WorkbenchArguments& a)
+Commissioning::Commissioning(const CommissioningArguments& a)
     : robot_(robot_type(a.config)), board_path_(a.board), board_(load_wiring(a.board)) {
   if (board_.robot.compare(robot_) != 0) {
     throw InputError(a.board + ": board.robot: \"" + board_.robot + "\" where " + a.config + " says \"" +
@@ -86,19 +86,19 @@ Workbench::Workbench(const WorkbenchArguments& a)
                      " motors where the robot has " + std::to_string(setup_.layout.wheels));
   if (a.backend == "stand") {
     setup_.world.seed = static_cast<std::uint64_t>(a.seed);
-    practice_ = std::make_unique<PracticeRobot>(setup_, parse_faults(a.faults, setup_.layout.wheels));
+    stand_ = std::make_unique<SimulatedStand>(setup_, parse_faults(a.faults, setup_.layout.wheels));
   } else if (!a.faults.empty()) {
     throw InputError("--practice-fault needs --backend stand");
   }
   watch_interrupts();
 }
 
-std::unique_ptr<Session> Workbench::open() {
+std::unique_ptr<ManualDrive> Commissioning::open() {
   rio_t io{};
   Ask ask = ask_person;
-  if (practice()) {
-    io = practice_->io();
-    ask = practice_->ask();
+  if (on_stand()) {
+    io = stand_->io();
+    ask = stand_->ask();
   } else {
     if (guard_ == nullptr) guard_ = std::make_unique<GuardProcess>(board_path_);
     bbb_error_t error{};
@@ -108,14 +108,14 @@ std::unique_ptr<Session> Workbench::open() {
       throw std::runtime_error(board_path_ + ": " + error.text + " (equipoise doctor --board " + board_path_ +
                                " finds the cause)");
   }
-  auto session = std::make_unique<Session>(io, std::move(ask), guard_ ? &guard_->page() : nullptr);
-  const std::string broken = self_test(session->io());
+  auto manual = std::make_unique<ManualDrive>(io, std::move(ask), guard_ ? &guard_->page() : nullptr);
+  const std::string broken = self_test(manual->io());
   if (!broken.empty()) throw std::runtime_error(board_path_ + ": self-test: " + broken);
-  return session;
+  return manual;
 }
 
-void Workbench::change_board(const Board& board) {
-  if (practice()) practice_->rewire(board_, board);
+void Commissioning::change_board(const Board& board) {
+  if (on_stand()) stand_->rewire(board_, board);
   board_ = board;
 }
 

@@ -1,0 +1,31 @@
+# Sourced after setup.sh and foreign_apt.sh: a package in a Debian that has nothing else.
+# shellcheck shell=bash disable=SC2154,SC2016
+
+# run_foreign_programs: lets this machine's kernel start armhf programs.
+run_foreign_programs() {
+  [ ! -e /proc/sys/fs/binfmt_misc/qemu-arm ] || return 0
+  [ -e /proc/sys/fs/binfmt_misc/status ] || as_root mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc >&2 || true
+  as_root update-binfmts --enable qemu-arm >&2 || true
+  [ -e /proc/sys/fs/binfmt_misc/qemu-arm ] ||
+    die "this machine's kernel does not run armhf programs: no /proc/sys/fs/binfmt_misc/qemu-arm"
+}
+
+# check_in_clean_debian SUITE ARCHITECTURE PACKAGE: it installs with what it depends on and nothing else, loads i2c-dev at
+# every start, flies a second, and leaves nothing of its own behind when purged.
+check_in_clean_debian() {
+  local mirror file
+  mirror=$(machine_mirror)
+  file=$(basename "$3")
+  [ "$2" = "$(dpkg --print-architecture)" ] || run_foreign_programs
+  say "Installing $file in a clean $1 $2"
+  as_root mmdebstrap --mode=root --quiet --variant=minbase --architectures="$2" \
+    --customize-hook="cp '$3' \"\$1/tmp/\"" \
+    --customize-hook="chroot \"\$1\" apt-get install -y --no-install-recommends /tmp/$file" \
+    --customize-hook='grep -qx i2c-dev "$1/usr/lib/modules-load.d/equipoise.conf"' \
+    --customize-hook='chroot "$1" equipoise sim --config /etc/equipoise/mbbr.toml --duration-s 1 --telemetry off --log /tmp/run.lcm' \
+    --customize-hook='chroot "$1" equipoise doctor --board /etc/equipoise/boards/robotics_cape_mbbr.toml' \
+    --customize-hook='chroot "$1" apt-get purge -y equipoise' \
+    --customize-hook='! find "$1/etc" "$1/usr" "$1/lib/systemd" "$1/lib/udev" -path "*equipoise*" | grep .' \
+    "$1" /dev/null "deb [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] $mirror $1 main" >&2 ||
+    die "$file does not hold in a clean $1 $2 (see above)"
+}
