@@ -9,45 +9,63 @@
 #include <cstring>
 #include <new>
 #include <stdexcept>
+#include <string>
 
 namespace equipoise::runtime {
+namespace {
 
-SharedHeartbeat::SharedHeartbeat(const std::string& name, Role role) : name_(name), role_(role) {
-  const bool create = role == Role::kGuard;
-  // Owner and group only: whoever can write here can keep the motors on.
-  if (create) shm_unlink(name.c_str());
-  const int fd =
-      shm_open(name.c_str(), create ? O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC : O_RDWR | O_CLOEXEC, 0660);
-  const auto fail = [&](const std::string& what) {
-    const int error = errno;
-    if (fd >= 0) close(fd);
-    throw std::runtime_error("heartbeat " + name + ": " + what + ": " + std::strerror(error));
-  };
-  if (fd < 0) fail(create ? "cannot be created" : "cannot be opened (is equipoise guard running?)");
-  if (create && ftruncate(fd, sizeof(HeartbeatPage)) != 0) fail("cannot be sized");
+constexpr off_t kSize = sizeof(HeartbeatPage);
+constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
+
+[[noreturn]] void fail(int fd, const std::string& what) {
+  if (fd >= 0) close(fd);
+  throw std::runtime_error("heartbeat page: " + what);
+}
+
+/// Memory is taken now: a machine without any says so here and not with a signal in the loop.
+int create() {
+  const int fd = memfd_create("equipoise-heartbeat", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  if (fd < 0) fail(fd, std::string("no shared memory: ") + std::strerror(errno));
+  if (fchmod(fd, 0600) != 0 || fallocate(fd, 0, 0, kSize) != 0 || fcntl(fd, F_ADD_SEALS, kSeals) != 0)
+    fail(fd, std::string("no memory for it: ") + std::strerror(errno));
+  return fd;
+}
+
+int checked(int fd) {
   struct stat status {};
-  if (fstat(fd, &status) != 0 || status.st_size < static_cast<off_t>(sizeof(HeartbeatPage))) {
-    errno = EBADMSG;
-    fail("is not a heartbeat page");
-  }
-  void* memory = mmap(nullptr, sizeof(HeartbeatPage), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-  if (memory == MAP_FAILED) fail("cannot be mapped");
-  close(fd);
-  if (create) {
-    page_ = new (memory) HeartbeatPage{};
-    page_->magic.store(HeartbeatPage::kMagic, std::memory_order_release);
-  } else {
-    page_ = static_cast<HeartbeatPage*>(memory);
-    if (page_->magic.load(std::memory_order_acquire) != HeartbeatPage::kMagic) {
-      munmap(memory, sizeof(HeartbeatPage));
-      throw std::runtime_error("heartbeat " + name + ": is not a heartbeat page");
-    }
-  }
+  if (fstat(fd, &status) != 0) fail(-1, std::string("descriptor: ") + std::strerror(errno));
+  const int seals = fcntl(fd, F_GET_SEALS);
+  if (status.st_nlink != 0 || seals < 0 || (seals & kSeals) != kSeals || status.st_size != kSize)
+    fail(fd, "the descriptor is not of sealed anonymous memory of its size");
+  if (status.st_uid != geteuid() || (status.st_mode & 077U) != 0)
+    fail(fd, "the descriptor's memory is open to another user");
+  return fd;
+}
+
+}  // namespace
+
+SharedHeartbeat::SharedHeartbeat() : fd_(create()) {
+  map();
+  page_ = new (page_) HeartbeatPage{};
+  page_->magic.store(HeartbeatPage::kMagic, std::memory_order_release);
+}
+
+SharedHeartbeat::SharedHeartbeat(int fd) : fd_(checked(fd)) {
+  map();
+  if (page_->magic.load(std::memory_order_acquire) == HeartbeatPage::kMagic) return;
+  munmap(page_, sizeof(HeartbeatPage));
+  fail(fd_, "something else is in the descriptor's memory");
+}
+
+void SharedHeartbeat::map() {
+  void* const memory = mmap(nullptr, sizeof(HeartbeatPage), PROT_READ | PROT_WRITE, MAP_SHARED, fd_, 0);
+  if (memory == MAP_FAILED) fail(fd_, std::string("cannot be mapped: ") + std::strerror(errno));
+  page_ = static_cast<HeartbeatPage*>(memory);
 }
 
 SharedHeartbeat::~SharedHeartbeat() {
   munmap(page_, sizeof(HeartbeatPage));
-  if (role_ == Role::kGuard) shm_unlink(name_.c_str());
+  close(fd_);
 }
 
 }  // namespace equipoise::runtime

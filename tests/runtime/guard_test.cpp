@@ -1,9 +1,12 @@
 // The guard as a process of its own, a stand-in for the loop as another, files in the place of sysfs. Times
-// are in the robot's ticks; the machine may be busy, so the best of a few attempts counts, and it is printed.
+// are counted from the loop's last beat to the guard's last write; the worst of all runs counts.
 #include "app/guard/guard.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,7 +24,9 @@ namespace {
 
 constexpr std::int64_t kTick_ns = 5'000'000;
 constexpr double kDeadline_ms = 15.0;  // three ticks
-constexpr int kAttempts = 20;
+constexpr double kSilent_ms = 7.5;     // two ticks, less what a poll may miss
+constexpr int kStrikes = 10;
+constexpr int kIdleTicks = 4;  // of a loop, before it asks for its motors
 
 class GuardProcess : public ::testing::Test {
  protected:
@@ -29,22 +34,21 @@ class GuardProcess : public ::testing::Test {
     dir_ = std::filesystem::temp_directory_path() / ("equipoise-guard-" + std::to_string(getpid()));
     std::filesystem::create_directories(dir_);
     for (const char* name : {"enable", "pwm0", "pwm1", "pwm2"}) std::ofstream(dir_ / name) << "0\n";
-    name_ = "/equipoise-test-" + std::to_string(getpid());
+    void* const memory =
+        mmap(nullptr, sizeof *beat_ns_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    ASSERT_NE(memory, MAP_FAILED);
+    beat_ns_ = new (memory) std::atomic<std::int64_t>{0};
     guard_ = fork();
     if (guard_ == 0) exec_guard("0");
-    connect();
-    ASSERT_NE(page_, nullptr) << "the guard did not start";
+    ASSERT_TRUE(beats()) << "the guard did not start";
   }
 
-  void connect() {
-    for (int i = 0; i < 1000 && page_ == nullptr; ++i) {
-      try {
-        page_ = std::make_unique<runtime::SharedHeartbeat>(name_, runtime::SharedHeartbeat::Role::kLoop);
-      } catch (const std::runtime_error&) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      }
-    }
+  bool beats() {
+    for (int i = 0; i < 1000 && page().guard.load() == 0; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return page().guard.load() != 0;
   }
+  runtime::HeartbeatPage& page() { return heartbeat_.page(); }
 
   /// As ps shows it: R, S, Z, ...; '?' when there is none.
   static char state_of(pid_t pid) {
@@ -60,16 +64,16 @@ class GuardProcess : public ::testing::Test {
     end(loop_);
     end(robot_);
     end(guard_);
-    shm_unlink(name_.c_str());  // a killed guard leaves its page
-    page_.reset();
+    munmap(beat_ns_, sizeof *beat_ns_);
     std::filesystem::remove_all(dir_);
   }
 
   /// `parent`: whose end is its own; 0: nobody's.
   [[noreturn]] void exec_guard(const char* parent) const {
-    execl(EQUIPOISE_BINARY, "equipoise", "guard", "--heartbeat", name_.c_str(), "--parent", parent,
-          "--enable", (dir_ / "enable").c_str(), "--pwm", (dir_ / "pwm0").c_str(), (dir_ / "pwm1").c_str(),
-          (dir_ / "pwm2").c_str(), nullptr);
+    const int fd = dup(heartbeat_.fd());  // without close-on-exec
+    execl(EQUIPOISE_BINARY, "equipoise", "guard", "--heartbeat-fd", std::to_string(fd).c_str(), "--parent",
+          parent, "--enable", (dir_ / "enable").c_str(), "--pwm", (dir_ / "pwm0").c_str(),
+          (dir_ / "pwm1").c_str(), (dir_ / "pwm2").c_str(), nullptr);
     _exit(127);
   }
 
@@ -87,11 +91,13 @@ class GuardProcess : public ::testing::Test {
     loop_ = fork();
     if (loop_ != 0) return;
     std::int64_t due_ns = runtime::monotonic_now_ns();
-    page_->page().want_enable.store(1);
+    page().want_enable.store(0);
     for (int tick = 0;; ++tick) {
+      if (tick == kIdleTicks) page().want_enable.store(1);
       if (tick == hang_after) pause();  // as in a read that never comes back: the lost interrupt
       for (const char* name : {"pwm0", "pwm1", "pwm2"}) std::ofstream(dir_ / name, std::ios::in) << "25000\n";
-      page_->page().loop.fetch_add(1);
+      beat_ns_->store(runtime::monotonic_now_ns());
+      page().loop.fetch_add(1);
       due_ns += kTick_ns;
       runtime::sleep_until(due_ns);
     }
@@ -103,8 +109,16 @@ class GuardProcess : public ::testing::Test {
     file >> line;
     return line;
   }
-  bool off() const {
-    return value("enable") == "0" && value("pwm0").find_first_not_of('0') == std::string::npos;
+  /// The guard writes one file after the other.
+  bool soon_off() const {
+    const auto zero = [this](const char* name) {
+      return value(name).find_first_not_of('0') == std::string::npos && !value(name).empty();
+    };
+    for (int i = 0; i < 1000; ++i) {
+      if (zero("enable") && zero("pwm0") && zero("pwm1") && zero("pwm2")) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return false;
   }
   bool wait_for(bool wanted_on, int limit_ms = 5000) const {
     const std::int64_t until = runtime::monotonic_now_ns() + std::int64_t{1'000'000} * limit_ms;
@@ -115,45 +129,47 @@ class GuardProcess : public ::testing::Test {
     return false;
   }
 
-  /// ms from the last beat until the bridges are asleep, best of several attempts.
+  /// ms from the last beat until the bridges are asleep and the PWM is at zero, by the guard's own clock; the
+  /// worst of all strikes.
   template <class Strike>
-  double best_off_ms(Strike&& strike, int hang_after = 1 << 30) {
-    double best = 1e9;
-    for (int i = 0; i < kAttempts && best > kDeadline_ms; ++i) {
+  double worst_off_ms(Strike&& strike, int hang_after = 1 << 30) {
+    double worst = 0.0;
+    for (int i = 0; i < kStrikes; ++i) {
+      const std::uint32_t cuts = page().cut.load();
       start_loop(hang_after);
       EXPECT_TRUE(wait_for(true));
-      std::uint32_t beat = page_->page().loop.load();
-      std::int64_t beat_ns = runtime::monotonic_now_ns();
       strike();
-      const std::int64_t struck_ns = runtime::monotonic_now_ns();
-      while (value("enable") == "1" && runtime::monotonic_now_ns() - struck_ns < 5'000'000'000) {
-        const std::uint32_t now = page_->page().loop.load();
-        if (now != beat) beat_ns = runtime::monotonic_now_ns();
-        beat = now;
-      }
-      best = std::min(best,
-                      1e-6 * static_cast<double>(runtime::monotonic_now_ns() - std::max(beat_ns, struck_ns)));
-      EXPECT_TRUE(off());
+      const std::int64_t limit_ns = runtime::monotonic_now_ns() + 5'000'000'000;
+      while (page().cut.load() == cuts && runtime::monotonic_now_ns() < limit_ns)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      EXPECT_EQ(page().cut.load(), cuts + 1);
+      worst = std::max(worst, 1e-6 * static_cast<double>(page().cut_ns.load() - beat_ns_->load()));
+      EXPECT_TRUE(soon_off());
       end(loop_);
     }
-    return best;
+    return worst;
   }
 
-  void report(const char* what, double ms) {
-    RecordProperty(what, std::to_string(ms));
+  /// The guard's scheduler, as the kernel shows it.
+  bool guard_is_realtime() const { return sched_getscheduler(guard_) == SCHED_FIFO; }
+
+  void judge(const char* what, double ms) {
     std::printf("off %.2f ms after %s\n", ms, what);
+    if (!guard_is_realtime()) GTEST_SKIP() << "no real-time priority here: " << ms << " ms is no evidence";
+    EXPECT_LE(ms, kDeadline_ms);
+    EXPECT_GE(ms, kSilent_ms);  // a guard that cuts earlier cuts loops that are well
   }
 
   std::filesystem::path dir_;
-  std::string name_;
-  std::unique_ptr<runtime::SharedHeartbeat> page_;
+  runtime::SharedHeartbeat heartbeat_;
+  std::atomic<std::int64_t>* beat_ns_ = nullptr;  // when the stand-in last beat
   pid_t guard_ = 0;
   pid_t loop_ = 0;
   pid_t robot_ = 0;  // whose child is a guard
 };
 
 TEST_F(GuardProcess, BridgesSleepUntilTheLoopBeats) {
-  EXPECT_TRUE(off());
+  EXPECT_TRUE(soon_off());
   start_loop();
   EXPECT_TRUE(wait_for(true));
 }
@@ -161,14 +177,14 @@ TEST_F(GuardProcess, BridgesSleepUntilTheLoopBeats) {
 TEST_F(GuardProcess, BridgesSleepWhenTheLoopDoesNotDrive) {
   start_loop();
   ASSERT_TRUE(wait_for(true));
-  page_->page().want_enable.store(0);
+  page().want_enable.store(0);
   EXPECT_TRUE(wait_for(false));
-  EXPECT_EQ(page_->page().cut.load(), 0U);  // not late: nothing to disarm for
+  EXPECT_EQ(page().cut.load(), 0U);  // not late: nothing to disarm for
 }
 
 TEST_F(GuardProcess, EndsWithTheProcessThatStartedIt) {
   end(guard_);
-  shm_unlink(name_.c_str());  // of the one just killed
+  page().guard.store(0);
   int to_parent[2];
   ASSERT_EQ(pipe(to_parent), 0);
   robot_ = fork();
@@ -180,9 +196,7 @@ TEST_F(GuardProcess, EndsWithTheProcessThatStartedIt) {
   }
   pid_t guard = 0;
   ASSERT_EQ(read(to_parent[0], &guard, sizeof guard), static_cast<ssize_t>(sizeof guard));
-  page_.reset();
-  connect();
-  while (page_->page().guard.load() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_TRUE(beats());
   start_loop();
   ASSERT_TRUE(wait_for(true));
   end(robot_);
@@ -195,38 +209,96 @@ TEST_F(GuardProcess, EndsWithTheProcessThatStartedIt) {
 }
 
 TEST_F(GuardProcess, StopsTheMotorsOfAKilledLoop) {
-  const double ms = best_off_ms([this] { kill(loop_, SIGKILL); });
-  report("SIGKILL", ms);
-  EXPECT_LE(ms, kDeadline_ms);
+  const double ms = worst_off_ms([this] { kill(loop_, SIGKILL); });
+  judge("SIGKILL", ms);
 }
 
 TEST_F(GuardProcess, StopsTheMotorsOfAStoppedLoop) {
-  const double ms = best_off_ms([this] { kill(loop_, SIGSTOP); });
-  report("SIGSTOP", ms);
-  EXPECT_LE(ms, kDeadline_ms);
+  const double ms = worst_off_ms([this] { kill(loop_, SIGSTOP); });
+  judge("SIGSTOP", ms);
 }
 
 TEST_F(GuardProcess, StopsTheMotorsOfALoopThatWaitsForALostInterrupt) {
-  const double ms = best_off_ms(
+  const double ms = worst_off_ms(
       [this] {
         std::uint32_t last = 0;
         do {  // until it beats no more
-          last = page_->page().loop.load();
+          last = page().loop.load();
           std::this_thread::sleep_for(std::chrono::microseconds(5500));
-        } while (last != page_->page().loop.load());
+        } while (last != page().loop.load());
       },
       40);
-  report("lost interrupt", ms);
-  EXPECT_LE(ms, kDeadline_ms);
+  judge("lost interrupt", ms);
 }
 
-TEST_F(GuardProcess, MotorsStayOffWhenAStoppedLoopWakesUp) {
+TEST_F(GuardProcess, MotorsStayOffWhenAStoppedLoopWakesUpUntilItHasLetGo) {
   start_loop();
   ASSERT_TRUE(wait_for(true));
+  const std::uint32_t cut = page().cut.load();
   kill(loop_, SIGSTOP);
   ASSERT_TRUE(wait_for(false));
-  const std::uint32_t cut = page_->page().cut.load();
-  EXPECT_GE(cut, 1U);  // what tells the loop to disarm
+  kill(loop_, SIGCONT);
+  const std::uint32_t woken = page().loop.load();
+  for (int i = 0; i < 200; ++i) {  // it beats and asks for its motors as if nothing had happened
+    EXPECT_EQ(value("enable"), "0") << i << " ms after it woke";
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_GT(page().loop.load(), woken + 10);
+  EXPECT_EQ(page().cut.load(), cut + 1);  // what tells the loop to disarm
+  page().want_enable.store(0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  page().want_enable.store(1);
+  EXPECT_TRUE(wait_for(true));
+}
+
+/// What a descriptor is refused for; "": it is taken. The descriptor is closed.
+std::string complaint(int fd) {
+  try {
+    const runtime::SharedHeartbeat page(fd);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(SharedHeartbeat, TakesOnlySealedAnonymousPagesOfOurs) {
+  const runtime::SharedHeartbeat own;
+  EXPECT_EQ(complaint(dup(own.fd())), "");
+  EXPECT_NE(complaint(-1), "");
+  EXPECT_NE(complaint(open("/tmp", O_TMPFILE | O_RDWR, 0600)).find("sealed"), std::string::npos);
+  const auto memory = [](off_t size, int seals) {
+    const int fd = memfd_create("page", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+    EXPECT_EQ(fchmod(fd, 0600), 0);
+    EXPECT_EQ(ftruncate(fd, size), 0);
+    EXPECT_EQ(fcntl(fd, F_ADD_SEALS, seals), 0);
+    return fd;
+  };
+  constexpr off_t kSize = sizeof(runtime::HeartbeatPage);
+  constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
+  EXPECT_NE(complaint(memory(kSize, F_SEAL_GROW | F_SEAL_SEAL)).find("sealed"), std::string::npos);
+  EXPECT_NE(complaint(memory(kSize - 1, kSeals)).find("size"), std::string::npos);
+  EXPECT_NE(complaint(memory(kSize, kSeals)).find("something else"), std::string::npos);
+  const int open_to_all = memory(kSize, kSeals);
+  EXPECT_EQ(fchmod(open_to_all, 0666), 0);
+  EXPECT_NE(complaint(open_to_all).find("another user"), std::string::npos);
+}
+
+TEST(SharedHeartbeat, AMachineWithoutRoomIsAnErrorText) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  ASSERT_NE(std::signal(SIGXFSZ, SIG_IGN), SIG_ERR);
+  rlimit none = before;
+  none.rlim_cur = 0;
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
+  std::string text;
+  try {
+    const runtime::SharedHeartbeat page;
+  } catch (const std::runtime_error& error) {
+    text = error.what();
+  }
+  EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_NE(text.find("no memory for it"), std::string::npos) << text;
 }
 
 TEST(SupervisorTest, ADeadGuardForbidsMotors) {

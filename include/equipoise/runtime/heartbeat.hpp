@@ -1,11 +1,10 @@
 // The page that loop and guard share: each counts up once per tick, each watches the other's count.
-// In: a POSIX shared-memory name -> out: counters, no locks, no futex. beat() and watch() are RT-safe.
+// In: a descriptor, for the page has no name that others could open -> out: counters, no locks, no futex.
 // The guard has stopped the motors when `cut` is set: the loop must disarm and say so.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
-#include <string>
 
 namespace equipoise::runtime {
 
@@ -16,8 +15,11 @@ struct HeartbeatPage {
   std::atomic<std::uint32_t> guard;        // counted up by the guard, once per poll
   std::atomic<std::uint32_t> cut;          // times the guard has stopped the motors
   std::atomic<std::uint32_t> want_enable;  // 1: the loop drives; the guard keeps the bridges awake
+  std::atomic<std::int64_t> cut_ns;        // monotonic; the motors were off by then, the last time
 };
-static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "shared between processes");
+static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
+                  std::atomic<std::int64_t>::is_always_lock_free,
+              "shared between processes");
 
 /// The guard polls at twice the tick's rate and yields to the loop: silent for six ticks, it is dead.
 inline constexpr std::int64_t kGuardSilent_ns = 30'000'000;
@@ -45,23 +47,25 @@ class BeatWatch {
   bool seen_ = false;
 };
 
-/// Maps the page; throws std::runtime_error naming it.
+/// Maps the page; throws std::runtime_error saying what is wrong with it.
 class SharedHeartbeat {
  public:
-  enum class Role { kGuard, kLoop };  // the guard creates the page and removes it
-  SharedHeartbeat(const std::string& name, Role role);
+  /// A new one in anonymous memory: whoever can write there can keep the motors on.
+  SharedHeartbeat();
+  /// Another process's, which hands over the descriptor: it must be such a page, sealed, and of our user.
+  explicit SharedHeartbeat(int fd);
   ~SharedHeartbeat();
   SharedHeartbeat(const SharedHeartbeat&) = delete;
   SharedHeartbeat& operator=(const SharedHeartbeat&) = delete;
 
   HeartbeatPage& page() noexcept { return *page_; }
+  int fd() const noexcept { return fd_; }  // closed with this, and in programs started
 
  private:
-  std::string name_;
-  Role role_;
+  void map();
+
+  int fd_;
   HeartbeatPage* page_ = nullptr;
 };
-
-inline constexpr const char* kDefaultHeartbeat = "/equipoise-heartbeat";
 
 }  // namespace equipoise::runtime

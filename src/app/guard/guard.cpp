@@ -22,6 +22,7 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
   GuardEnd end;
   runtime::BeatWatch loop(options.silent_ticks * options.period_ns);
   bool on = false;
+  bool cut = false;  // and the loop has not answered by letting go
   end.error = bridges.off();
   const std::int64_t poll_ns = options.period_ns / 2;
   std::int64_t due_ns = runtime::monotonic_now_ns();
@@ -33,7 +34,9 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
     if (now_ns - due_ns > options.period_ns) due_ns = now_ns;  // late ourselves: no burst of polls
     page.guard.fetch_add(1, std::memory_order_release);
     const bool alive = loop.alive(page.loop.load(std::memory_order_acquire), now_ns);
-    const bool wanted = alive && page.want_enable.load(std::memory_order_relaxed) != 0;
+    const bool asked = page.want_enable.load(std::memory_order_relaxed) != 0;
+    if (alive && !asked) cut = false;  // the loop has let go: what it asks for from now on it means
+    const bool wanted = alive && asked && !cut;
     if (wanted && !on) {
       const int error = bridges.enable();
       on = error == 0;
@@ -43,12 +46,13 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
       if (error != 0) end.error = error;
       on = false;
       if (!alive) {
+        cut = true;
         ++end.cuts;
-        end.last_cut_ns = runtime::monotonic_now_ns();
+        page.cut_ns.store(runtime::monotonic_now_ns(), std::memory_order_relaxed);
         page.cut.fetch_add(1, std::memory_order_release);
       }
-    } else if (!alive) {
-      (void)bridges.off();  // a stopped loop that wakes up may still write one old duty
+    } else if (!alive || cut) {
+      (void)bridges.off();  // a stopped loop that wakes up may still write an old duty
     }
     if (now_ns >= next_watchdog_ns) {
       notify_service_manager("WATCHDOG=1");
@@ -63,7 +67,7 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
 namespace {
 
 struct Arguments {
-  std::string heartbeat = runtime::kDefaultHeartbeat;
+  int heartbeat_fd = -1;
   std::string board;
   std::string enable;
   std::vector<std::string> pwm;
@@ -90,15 +94,16 @@ bool follow(int parent) {
 int run(const Arguments& a) {
   watch_interrupts();
   std::unique_ptr<Bridges> bridges;
+  std::unique_ptr<runtime::SharedHeartbeat> heartbeat;
   try {
     bridges = bridges_of(a);
+    heartbeat = std::make_unique<runtime::SharedHeartbeat>(a.heartbeat_fd);
   } catch (const std::runtime_error& error) {
     if (a.complain_fd == STDERR_FILENO) throw;
     (void)!write(a.complain_fd, error.what(), std::strlen(error.what()));
     return 1;
   }
   if (a.parent != 0 && !follow(a.parent)) return 0;
-  runtime::SharedHeartbeat heartbeat(a.heartbeat, runtime::SharedHeartbeat::Role::kGuard);
   runtime::RealtimeWish wish;
   wish.priority = a.priority;
   wish.shallow_idle = false;  // the loop holds it
@@ -111,7 +116,7 @@ int run(const Arguments& a) {
   options.period_ns = static_cast<std::int64_t>(a.period_ms * 1e6);
   options.silent_ticks = a.silent_ticks;
   notify_service_manager("READY=1");
-  const GuardEnd end = guard_loop(options, *bridges, heartbeat.page(), interrupted);
+  const GuardEnd end = guard_loop(options, *bridges, heartbeat->page(), interrupted);
   notify_service_manager("STOPPING=1");
   if (end.error != 0) {
     std::fprintf(stderr, "equipoise: guard: a bridge could not be switched: %s\n", std::strerror(-end.error));
@@ -126,7 +131,8 @@ void add_guard(Subcommand app) {
   const Subcommand command =
       app.subcommand("guard", "stop the motors when the loop is dead, stopped or hanging");
   auto a = std::make_shared<Arguments>();
-  command.option("--heartbeat", a->heartbeat, "shared-memory name").show_default();
+  command.option("--heartbeat-fd", a->heartbeat_fd, "descriptor of the page on which the loop beats")
+      .required();
   command.option("--board", a->board, "wiring, TOML: the bridges to hold; see config/boards");
   command.option("--enable", a->enable, "value file of the bridge enable line: 1 awake, 0 asleep");
   command.option("--pwm", a->pwm, "duty_cycle file of each motor's PWM channel, instead of --board");

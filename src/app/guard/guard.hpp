@@ -1,6 +1,7 @@
 // The guard: stops the bridges when the loop's heartbeat stops. In: heartbeat page, bridges -> out: bridges
 // asleep and every PWM at zero within silent_ticks of the last beat and half a tick of polling, whatever
-// happened to the loop (SIGKILL, SIGSTOP, hang). Bridges wake only while the loop beats and asks for them.
+// happened to the loop (SIGKILL, SIGSTOP, hang). Bridges wake only while the loop beats and asks for them;
+// once they were cut, a loop that comes back must have let go first.
 #pragma once
 
 #include <array>
@@ -60,7 +61,6 @@ struct GuardOptions {
 struct GuardEnd {
   int error = 0;
   std::int64_t cuts = 0;
-  std::int64_t last_cut_ns = 0;
 };
 
 GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::HeartbeatPage& page,

@@ -32,7 +32,8 @@ std::vector<char*> environment() {
   return variables;
 }
 
-constexpr int kComplaints = 3;  // the child's file descriptor
+constexpr int kComplaints = 3;  // the child's file descriptors
+constexpr int kHeartbeat = 4;
 
 /// What the guard said before it ended.
 std::string text_of(int fd) {
@@ -56,7 +57,7 @@ struct Pipe {
   std::array<int, 2> ends{};
 };
 
-pid_t spawn(std::vector<std::string> arguments, int complaints) {
+pid_t spawn(std::vector<std::string> arguments, int complaints, int heartbeat) {
   std::vector<char*> argv(arguments.size());
   std::transform(arguments.begin(), arguments.end(), argv.begin(), [](std::string& a) { return a.data(); });
   argv.push_back(nullptr);
@@ -67,7 +68,14 @@ pid_t spawn(std::vector<std::string> arguments, int complaints) {
   posix_spawnattr_setpgroup(&attributes, 0);
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_adddup2(&files, complaints, kComplaints);
+  // Both far up first: one's number may be the other's place.
+  constexpr int kOutOfTheWay = 100;
+  posix_spawn_file_actions_adddup2(&files, complaints, kOutOfTheWay + kComplaints);
+  posix_spawn_file_actions_adddup2(&files, heartbeat, kOutOfTheWay + kHeartbeat);
+  for (const int fd : {kComplaints, kHeartbeat}) {
+    posix_spawn_file_actions_adddup2(&files, kOutOfTheWay + fd, fd);
+    posix_spawn_file_actions_addclose(&files, kOutOfTheWay + fd);
+  }
   pid_t pid = 0;
   const int error =
       posix_spawn(&pid, "/proc/self/exe", &files, &attributes, argv.data(), environment().data());
@@ -81,11 +89,10 @@ pid_t spawn(std::vector<std::string> arguments, int complaints) {
 }  // namespace
 
 GuardProcess::GuardProcess(const std::string& board_path) {
-  const std::string name = std::string(runtime::kDefaultHeartbeat) + "-" + std::to_string(getpid());
   const Pipe complaints;
-  pid_ = spawn({"equipoise", "guard", "--board", board_path, "--heartbeat", name, "--parent",
-                std::to_string(getpid()), "--complain-fd", std::to_string(kComplaints)},
-               complaints.ends[1]);
+  pid_ = spawn({"equipoise", "guard", "--board", board_path, "--heartbeat-fd", std::to_string(kHeartbeat),
+                "--parent", std::to_string(getpid()), "--complain-fd", std::to_string(kComplaints)},
+               complaints.ends[1], heartbeat_.fd());
   for (int i = 0; i < kStartPolls; ++i) {
     int status = 0;
     if (ended(&status)) {
@@ -94,12 +101,7 @@ GuardProcess::GuardProcess(const std::string& board_path) {
       throw std::runtime_error(
           what.append(" (equipoise doctor --board ").append(board_path).append(" finds the cause)"));
     }
-    try {
-      if (page_ == nullptr)
-        page_ = std::make_unique<runtime::SharedHeartbeat>(name, runtime::SharedHeartbeat::Role::kLoop);
-      if (page_->page().guard.load(std::memory_order_acquire) != 0) return;  // it beats
-    } catch (const std::runtime_error&) {                                    // not made yet
-    }
+    if (page().guard.load(std::memory_order_acquire) != 0) return;  // it beats
     std::this_thread::sleep_for(kPoll);
   }
   stop();

@@ -5,7 +5,6 @@
 
 #include <sys/types.h>
 
-#include <memory>
 #include <string>
 
 #include "equipoise/runtime/heartbeat.hpp"
@@ -19,14 +18,14 @@ class GuardProcess {
   GuardProcess(const GuardProcess&) = delete;
   GuardProcess& operator=(const GuardProcess&) = delete;
 
-  runtime::HeartbeatPage& page() noexcept { return page_->page(); }
+  runtime::HeartbeatPage& page() noexcept { return heartbeat_.page(); }
 
  private:
   bool ended(int* status);
   void stop();
 
   pid_t pid_ = 0;
-  std::unique_ptr<runtime::SharedHeartbeat> page_;
+  runtime::SharedHeartbeat heartbeat_;
 };
 
 }  // namespace equipoise::app
