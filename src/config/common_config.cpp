@@ -145,6 +145,10 @@ void read_disturbance(Section& s, WorldParams* w) {
   w->encoder_sample_age_s = number_or(s, "encoder_sample_age_s", 0.0, 0.0, 0.01);
   w->imu_misalignment_rad = s.vector<3>("imu_misalignment_rad", -0.5, 0.5);
   w->floor_slope_rad = s.vector<2>("floor_slope_rad", -0.3, 0.3);
+  w->rolling_resistance = number_or(s, "rolling_resistance", 0.0, 0.0, 0.5);
+  if (s.has("gyro_scale_error")) w->gyro_scale_error = s.vector<3>("gyro_scale_error", -0.2, 0.2);
+  if (s.has("gyro_drift_rad_s")) w->gyro_drift_rad_s = s.vector<3>("gyro_drift_rad_s", -0.5, 0.5);
+  w->warm_up_s = number_or(s, "warm_up_s", 60.0, 0.1, 1e4);
 }
 
 }  // namespace

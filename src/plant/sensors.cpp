@@ -77,8 +77,11 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
   const auto as_mounted = [this](const Vec3& v) {
     return misaligned_ ? Vec3(R_misaligned_.transpose() * v) : v;
   };
-  const Vec3 gyro =
+  Vec3 gyro =
       as_mounted(m.omega_B_rad_s) + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
+  gyro += world_.gyro_scale_error.cwiseProduct(gyro);
+  if (!world_.gyro_drift_rad_s.isZero(0.0))
+    gyro -= world_.gyro_drift_rad_s * std::expm1(-m.time_s / world_.warm_up_s);
   const Vec3 accel = as_mounted(m.specific_force_B_m_s2) + accel_bias_ +
                      accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
   attitude_packet(m.theta_rad);

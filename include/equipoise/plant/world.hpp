@@ -75,7 +75,11 @@ struct WorldParams {
   double imu_sample_age_s = 0.0;
   double encoder_sample_age_s = 0.0;
   Vec3 imu_misalignment_rad = Vec3::Zero();  // rotation vector, body axes: mount against calibration
+  Vec3 gyro_scale_error = Vec3::Zero();      // of each sensor axis
+  Vec3 gyro_drift_rad_s = Vec3::Zero();      // bias that warming up adds in the end
+  double warm_up_s = 60.0;                   // its time constant
   Vec2 floor_slope_rad = Vec2::Zero();       // rise towards world x, y
+  double rolling_resistance = 0.0;           // of the weight
   ActualScales actual;
 
   double gyro_age_s() const noexcept {

@@ -19,6 +19,7 @@ void add_commands(Subcommand app) {
   add_identify(app);
   add_bench(app);
   add_campaign(app);
+  add_trials(app);
   add_guard(app);
   add_doctor(app);
   add_calibrate(app);

@@ -25,6 +25,7 @@ void add_friction_rig(Subcommand app);
 void add_identify(Subcommand app);
 void add_bench(Subcommand app);
 void add_campaign(Subcommand app);
+void add_trials(Subcommand app);
 void add_guard(Subcommand app);
 void add_doctor(Subcommand app);
 void add_calibrate(Subcommand app);

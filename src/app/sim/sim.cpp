@@ -8,6 +8,7 @@
 #include "app/cli/interrupt.hpp"
 #include "app/log/log_name.hpp"
 #include "app/sim/simulate.hpp"
+#include "config/population.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
@@ -19,6 +20,7 @@ struct Arguments {
   Choice choice;
   double yaw_hz = 0.0;
   std::vector<std::string> set;
+  std::int64_t robot = 0;
   std::string log;
   std::string json;
   bool realtime = false;
@@ -33,6 +35,7 @@ nlohmann::json to_json(const Arguments& a, const SimSummary& s, const std::strin
                         {Firmware::kSpeedRmseKey, errors.speed_rmse}};
   }
   nlohmann::json out{{"robot", Firmware::kName},
+                     {"robot_number", a.robot},
                      {"seed", a.options.seed},
                      {"estimator", a.choice.estimator},
                      {"controller", a.choice.controller},
@@ -192,6 +195,11 @@ void add_sim(Subcommand app) {
   command.option("--fidelity", a->choice.fidelity, "ideal, thesis, nominal, full")
       .show_default()
       .one_of(kFidelityNames);
+  command
+      .option("--robot", a->robot,
+              "draw this robot from [population] of the configuration; 0: the typical one")
+      .show_default()
+      .range(0.0, 1e12);
   a->choice.attitude = "dmp";
   command.option("--attitude", a->choice.attitude, "attitude source: dmp (packets), own (our filter)")
       .show_default()

@@ -132,6 +132,9 @@ void read_disturbance(Section& s, MbbrWorldParams* w) {
   w->drive.rollers_per_turn = s.number("rollers_per_turn", 1.0, 100.0);
   w->drive.roller_slip_N_m = s.number("roller_slip_N_m", 0.0, 1.0);
   w->drive.wheel_grip = s.number("wheel_grip", 0.0, 5.0);
+  w->drive.gearbox_friction_share = config::number_or(s, "gearbox_friction_share", 0.0, 0.0, 1.0);
+  w->floor.grip = config::number_or(s, "floor_grip", 0.0, 0.0, 5.0);
+  w->floor.torsion_radius_m = config::number_or(s, "floor_torsion_radius_m", 0.004, 0.0, 0.1);
 }
 
 MbbrWorldParams read_mbbr_world(Section s, BridgeType* bridge) {
@@ -187,6 +190,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
         read_mbbr_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
   }
   world.finish();
+  if (root.has("population")) root.table("population");  // read when a robot is drawn
   root.finish();
   loaded.sha256 = document.sha256();
   loaded.toml = document.canonical();

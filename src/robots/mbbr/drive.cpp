@@ -1,6 +1,6 @@
 #include "robots/mbbr/drive.hpp"
 
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 #include <algorithm>
 
 namespace equipoise {
@@ -36,18 +36,29 @@ MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p)
     : p_(p),
       kinematics_(robot),
       ratio_(robot.r / robot.r_w),
-      grip_N_m_(grip_limit_N_m(p.wheel_grip, robot)),
+      wheel_radius_m_(robot.r_w),
+      grip_N_m_(Vec3::Constant(grip_limit_N_m(p.wheel_grip, robot))),
       contacts_(wheel_contacts(robot)),
-      tilted_(kinematics_.T_ob()) {}
+      loads_from_force_(contacts_.inverse()),
+      tilted_(kinematics_.T_ob()) {
+  for (int i = 0; i < Mbbr::kWheels; ++i) {
+    const Vec3 axis = kinematics_.T_ob().col(i);
+    pushes_.col(i) = axis.cross(Vec3(contacts_.col(i)));
+  }
+}
 
 Vec3 MbbrDrive::wheel_rates(const Vec3& relative_rate_B) const noexcept {
   if (!tilts()) return kinematics_.wheels_from_ball(relative_rate_B);
   return ratio_ * (tilted_.transpose() * relative_rate_B);
 }
 
-/// Before grip limits them.
-Vec3 MbbrDrive::wheel_torques(const Motors& motors, const Vec3& wheel_rate) const noexcept {
-  return engaged_.cwiseProduct(p_.wheel_torque_scale).cwiseProduct(motors.torque(wheel_rate)) + ripple_N_m_;
+Vec3 MbbrDrive::wheel_torques(const Motors& motors, const Vec3& relative_rate_B) const noexcept {
+  const Vec3 torque = motors.torque(wheel_rates(relative_rate_B));
+  return engaged_.cwiseProduct(p_.wheel_torque_scale).cwiseProduct(torque) + ripple_N_m_;
+}
+
+Vec3 MbbrDrive::contact_torques(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept {
+  return wheel_torque + p_.gearbox_friction_share * kinematics_.wheels_from_axes(friction_B);
 }
 
 void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, const Vec3& wheel_angle_rad,
@@ -60,28 +71,39 @@ void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, co
   if (p_.roller_slip_N_m != 0.0) {
     ripple_N_m_ = p_.roller_slip_N_m * (p_.rollers_per_turn * wheel_angle_rad).array().sin().matrix();
   }
-  const Vec3 wheel_rate = wheel_rates(relative_rate_B);
   if (p_.gear.play_rad != 0.0) {
-    Vec3 motor_rate = wheel_rate;
+    Vec3 motor_rate = wheel_rates(relative_rate_B);
     for (int i = 0; i < Mbbr::kWheels; ++i) motor_rate(i) += gears_[static_cast<std::size_t>(i)].rate_rad_s();
     const Vec3 torque = motors.torque(motor_rate);
     for (int i = 0; i < Mbbr::kWheels; ++i) {
       engaged_(i) = gears_[static_cast<std::size_t>(i)].step(p_.gear, torque(i), step_s) ? 1.0 : 0.0;
     }
   }
-  if (p_.wheel_grip != 0.0) {
-    const Vec3 torque = wheel_torques(motors, wheel_rate);
-    for (int i = 0; i < Mbbr::kWheels; ++i) {
-      slip_rad_(i) += limit_by_grip(torque(i), grip_N_m_, motors.damping_N_m_s()).slip_rad_s * step_s;
-    }
+}
+
+Vec3 MbbrDrive::torque_B(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept {
+  Vec3 passed = wheel_torque;
+  Vec3 beyond = friction_B;
+  if (slips()) {
+    passed = contact_torques(wheel_torque, friction_B).cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
+    beyond *= 1.0 - p_.gearbox_friction_share;
+  }
+  if (!tilts()) return kinematics_.axes_from_wheels(passed) + beyond;
+  return ratio_ * (tilted_ * passed) + beyond;
+}
+
+void MbbrDrive::slip_over(const Motors& motors, const Vec3& wheel_torque, const Vec3& friction_B,
+                          double step_s) noexcept {
+  const Vec3 torque = contact_torques(wheel_torque, friction_B);
+  for (int i = 0; i < Mbbr::kWheels; ++i) {
+    slip_rad_(i) += limit_by_grip(torque(i), grip_N_m_(i), motors.damping_N_m_s()).slip_rad_s * step_s;
   }
 }
 
-Vec3 MbbrDrive::torque_B(const Motors& motors, const Vec3& relative_rate_B) const noexcept {
-  Vec3 torque = wheel_torques(motors, wheel_rates(relative_rate_B));
-  if (p_.wheel_grip != 0.0) torque = torque.cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
-  if (!tilts()) return kinematics_.axes_from_wheels(torque);
-  return ratio_ * (tilted_ * torque);
+void MbbrDrive::carry(const Vec3& body_force_B, const Vec3& wheel_torque, const Vec3& friction_B) noexcept {
+  const Vec3 passed = contact_torques(wheel_torque, friction_B).cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
+  const Vec3 normal_N = loads_from_force_ * (body_force_B + pushes_ * passed / wheel_radius_m_);
+  grip_N_m_ = p_.wheel_grip * wheel_radius_m_ * normal_N.cwiseMax(0.0);
 }
 
 Vec3 MbbrDrive::seen_rate_B(const Vec3& relative_rate_B) const noexcept {

@@ -15,10 +15,11 @@ namespace equipoise {
 struct MbbrDriveParams {
   Vec3 wheel_torque_scale = Vec3::Ones();  // torque of each motor over nominal
   GearPlayParams gear;
-  double roller_tilt_rad = 0.0;    // of a wheel's torque axis, towards either row; (2.1)
-  double rollers_per_turn = 12.0;  // of each row
-  double roller_slip_N_m = 0.0;    // micro-slip: torque ripple of a wheel as rollers pass
-  double wheel_grip = 0.0;         // friction coefficient at the ball; 0: wheels never slip
+  double roller_tilt_rad = 0.0;         // of a wheel's torque axis, towards either row; (2.1)
+  double rollers_per_turn = 12.0;       // of each row
+  double roller_slip_N_m = 0.0;         // micro-slip: torque ripple of a wheel as rollers pass
+  double wheel_grip = 0.0;              // friction coefficient at the ball; 0: wheels never slip
+  double gearbox_friction_share = 0.0;  // of the drive's friction that sits before the contact
 };
 
 /// Contact normals of the wheels, columns, body axes.
@@ -41,12 +42,20 @@ class MbbrDrive {
 
   MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p);
 
-  /// Rows, gears and slip are held over a step.
+  /// Rows and gears are held over a step.
   void begin_step(const Motors& motors, const Vec3& relative_rate_B, const Vec3& wheel_angle_rad,
                   double step_s) noexcept;
 
-  /// Torque of the motors on the ball, body axes.
-  Vec3 torque_B(const Motors& motors, const Vec3& relative_rate_B) const noexcept;
+  /// Of each motor at its wheel, before friction and grip.
+  Vec3 wheel_torques(const Motors& motors, const Vec3& relative_rate_B) const noexcept;
+  /// On the ball, body axes: what the contacts pass on of motors and gears, and the friction beyond them.
+  Vec3 torque_B(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept;
+  /// Motors whose contacts slip run ahead.
+  void slip_over(const Motors& motors, const Vec3& wheel_torque, const Vec3& friction_B,
+                 double step_s) noexcept;
+  /// Loads on the contacts from now on; `body_force_B`: mass times specific force of the body, less pushes.
+  void carry(const Vec3& body_force_B, const Vec3& wheel_torque, const Vec3& friction_B) noexcept;
+  bool slips() const noexcept { return p_.wheel_grip != 0.0; }
   /// Rate of the ball as the wheels' nominal axes report it.
   Vec3 seen_rate_B(const Vec3& relative_rate_B) const noexcept;
   /// What play and slip add to the motors' angles.
@@ -55,14 +64,18 @@ class MbbrDrive {
  private:
   bool tilts() const noexcept { return p_.roller_tilt_rad != 0.0; }
   Vec3 wheel_rates(const Vec3& relative_rate_B) const noexcept;
-  Vec3 wheel_torques(const Motors& motors, const Vec3& wheel_rate) const noexcept;
+  /// Motor less the friction before it.
+  Vec3 contact_torques(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept;
 
   MbbrDriveParams p_;
   MbbrKinematics kinematics_;
   double ratio_;
-  double grip_N_m_;
+  double wheel_radius_m_;
+  Vec3 grip_N_m_;  // of each wheel under its load
   Mat3 contacts_;  // normals, columns
-  Mat3 tilted_;    // axes of the rows that carry now, columns
+  Mat3 pushes_;    // directions in which the wheels push the ball, columns
+  Mat3 loads_from_force_;
+  Mat3 tilted_;  // axes of the rows that carry now, columns
   Vec3 engaged_ = Vec3::Ones();
   Vec3 ripple_N_m_ = Vec3::Zero();
   Vec3 slip_rad_ = Vec3::Zero();

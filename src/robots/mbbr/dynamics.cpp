@@ -83,14 +83,15 @@ MbbrAccelerations MbbrDynamics::response(const MbbrMotion& m, const MbbrMass& ma
 }
 
 Vec3 MbbrDynamics::encoder_rate_B(const MbbrMotion& m) noexcept {
-  return m.R().transpose().leftCols<2>() * m.phi_dot_star - m.omega_B;
+  return m.R().transpose() * Vec3(m.phi_dot_star.x(), m.phi_dot_star.y(), m.spin_rad_s) - m.omega_B;
 }
 
-Vec3 MbbrDynamics::accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
+Vec3 MbbrDynamics::accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a,
+                                   const Vec3& arm_B) const noexcept {
   const Vec2 ball = ball_velocity(p_.r, a.phi_ddot_inertial);
   const Vec3 gravity_minus_ball(-ball.x(), -ball.y(), -kGravity_m_s2);
-  return m.R().transpose() * gravity_minus_ball - a.omega_dot_B.cross(p_.l_a) -
-         m.omega_B.cross(m.omega_B.cross(p_.l_a));
+  return m.R().transpose() * gravity_minus_ball - a.omega_dot_B.cross(arm_B) -
+         m.omega_B.cross(m.omega_B.cross(arm_B));
 }
 
 Vec2 MbbrDynamics::phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept {

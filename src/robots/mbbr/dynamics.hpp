@@ -27,6 +27,7 @@ class MbbrMotion {
 
   Vec3 omega_B = Vec3::Zero();       // body rates
   Vec2 phi_dot_star = Vec2::Zero();  // ball rates, yaw frame
+  double spin_rad_s = 0.0;           // ball about the vertical; only where it slips on the floor
 
  private:
   Vec2 theta_xy_ = Vec2::Zero();
@@ -72,7 +73,11 @@ class MbbrDynamics {
   static Vec3 encoder_rate_B(const MbbrMotion& m) noexcept;
 
   /// Gravity minus acceleration at the IMU, body axes: the negative of an accelerometer's reading. [T] (5.26)
-  Vec3 accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
+  Vec3 accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
+    return accelerometer_B(m, a, p_.l_a);
+  }
+  /// The same at another place of the body.
+  Vec3 accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a, const Vec3& arm_B) const noexcept;
 
   /// d(phi*')/dt: the inertial acceleration plus the transport term of the turning frame.
   static Vec2 phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept;

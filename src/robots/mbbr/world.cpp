@@ -1,15 +1,19 @@
 #include "robots/mbbr/world.hpp"
 
+#include <algorithm>
+
 #include "equipoise/plant/coulomb.hpp"
 #include "equipoise/plant/integrator.hpp"
 
 namespace equipoise {
 namespace {
 
-enum At : int { kTheta = 0, kOmega = 3, kPhiDot = 6, kPhi = 8, kRelative = 10 };
+constexpr double kRollingStart_m_s = 0.005;  // below it rolling resistance fades
 
-Vec<13> start_state(NoiseStream& noise, double sigma) {
-  Vec<13> s = Vec<13>::Zero();
+enum At : int { kTheta = 0, kOmega = 3, kPhiDot = 6, kPhi = 8, kRelative = 10, kSlip = 13, kSpin = 15 };
+
+Vec<16> start_state(NoiseStream& noise, double sigma) {
+  Vec<16> s = Vec<16>::Zero();
   s.segment<3>(kTheta) = noise.gaussian_vector<3>(sigma);
   return s;
 }
@@ -40,13 +44,16 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       mobility_(dynamics_.relative_mobility()),
       motors_(motor, calibration, world.common),
       drive_(robot_, world.drive),
+      floor_(robot_, world.floor),
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
       s_(start_state(start_noise_, world.common.initial_tilt_rad)),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)) {}
 
 MbbrMotion MbbrWorld::motion(const State& s) noexcept {
-  return {s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot)};
+  MbbrMotion m(s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot));
+  m.spin_rad_s = s(kSpin);
+  return m;
 }
 
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept {
@@ -56,33 +63,49 @@ Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& r
   return limit;
 }
 
-/// On a slope the whole weight pulls the ball downhill, yaw frame, N.
-Vec2 MbbrWorld::slope_pull_star(double theta_z) const noexcept {
+/// On a slope the whole weight pulls the ball downhill; rolling resistance holds it back. Yaw frame, N.
+Vec2 MbbrWorld::pull_star(const State& s) const noexcept {
+  Vec2 pull = Vec2::Zero();
+  const double weight_N = (robot_.m_t + robot_.m_b) * kGravity_m_s2;
   const Vec2& slope = world_.common.floor_slope_rad;
-  if (slope.isZero(0.0)) return Vec2::Zero();
-  return rotate(-theta_z, Vec2(-(robot_.m_t + robot_.m_b) * kGravity_m_s2 * slope));
+  if (!slope.isZero(0.0)) pull = rotate(-s(kTheta + 2), Vec2(-weight_N * slope));
+  if (world_.common.rolling_resistance != 0.0) {
+    const Vec2 v = ball_velocity(robot_.r, s.segment<2>(kPhiDot));
+    pull -= world_.common.rolling_resistance * weight_N * v / std::max(v.norm(), kRollingStart_m_s);
+  }
+  return pull;
 }
 
-MbbrWorld::Instant MbbrWorld::without_coulomb(const State& s, const Vec2& push_W) const noexcept {
+MbbrWorld::Instant MbbrWorld::forces(const State& s, const Vec2& push_W,
+                                     const Vec3& friction_B) const noexcept {
   Instant now;
   now.motion = motion(s);
-  now.mass = dynamics_.mass(now.motion);
   const Vec3 relative = MbbrDynamics::encoder_rate_B(now.motion);
-  MbbrLoads loads;
-  loads.tau_B = drive_.torque_B(motors_, relative);
-  if (world_.common.friction) loads.tau_B -= (robot_.mu_v + world_.extra_viscous_N_m_s) * relative;
-  const double theta_z = s(kTheta + 2);
+  const double viscous = world_.common.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
+  now.viscous_B = -viscous * relative;
+  now.wheel_torque = drive_.wheel_torques(motors_, relative);
+  now.loads.tau_B = drive_.torque_B(now.wheel_torque, now.viscous_B + friction_B);
   if (!push_W.isZero(0.0)) {
-    loads.push_B = now.motion.R().topRows<2>().transpose() * rotate(-theta_z, push_W);
+    now.loads.push_B = now.motion.R().topRows<2>().transpose() * rotate(-s(kTheta + 2), push_W);
   }
-  loads.pull_star = slope_pull_star(theta_z);
-  now.a = dynamics_.accelerations(now.motion, now.mass, loads);
+  now.loads.pull_star = pull_star(s);
   return now;
 }
 
-MbbrWorld::Instant MbbrWorld::with_torque(const Instant& free, const Vec3& torque_B) const noexcept {
+MbbrWorld::Instant MbbrWorld::rolling(const State& s, const Vec2& push_W,
+                                      const Vec3& friction_B) const noexcept {
+  Instant now = forces(s, push_W, friction_B);
+  now.mass = dynamics_.mass(now.motion);
+  now.a = dynamics_.accelerations(now.motion, now.mass, now.loads);
+  return now;
+}
+
+/// The same instant with friction: forces and mass matrix are known, the accelerations linear in the torque.
+MbbrWorld::Instant MbbrWorld::with_friction(const Instant& free, const Vec3& friction_B) const noexcept {
   Instant now = free;
-  const MbbrAccelerations more = dynamics_.response(free.motion, free.mass, torque_B);
+  now.loads.tau_B = drive_.torque_B(free.wheel_torque, free.viscous_B + friction_B);
+  const MbbrAccelerations more =
+      dynamics_.response(free.motion, free.mass, now.loads.tau_B - free.loads.tau_B);
   now.a.omega_dot_B += more.omega_dot_B;
   now.a.phi_ddot_inertial += more.phi_ddot_inertial;
   return now;
@@ -96,7 +119,30 @@ MbbrWorld::State MbbrWorld::derivative(const State& s, const Instant& now) const
   d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, now.a);
   d.segment<2>(kPhi) = rotate(s(kTheta + 2), m.phi_dot_star);
   d.segment<3>(kRelative) = drive_.seen_rate_B(MbbrDynamics::encoder_rate_B(m));
+  d.segment<3>(kSlip).setZero();
   return d;
+}
+
+MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const MbbrMotion& m,
+                                            const MbbrSlipAccelerations& a) const noexcept {
+  const Vec3 theta_dot = m.theta_dot();
+  const auto turning = [&](const Vec2& v) { return Vec2(theta_dot.z() * Vec2(v.y(), -v.x())); };
+  const Vec2 slip = s.segment<2>(kSlip);
+  const Vec2 slip_dot = a.centre_star - ball_velocity(robot_.r, a.ball_dot.head<2>());
+  State d;
+  d.segment<3>(kTheta) = theta_dot;
+  d.segment<3>(kOmega) = a.omega_dot_B;
+  d.segment<2>(kPhiDot) = a.ball_dot.head<2>() + turning(m.phi_dot_star);
+  d.segment<2>(kPhi) = rotate(s(kTheta + 2), m.phi_dot_star + Vec2(-slip.y(), slip.x()) / robot_.r);
+  d.segment<3>(kRelative) = drive_.seen_rate_B(MbbrDynamics::encoder_rate_B(m));
+  d.segment<2>(kSlip) = slip_dot + turning(slip);
+  d(kSpin) = a.ball_dot.z();
+  return d;
+}
+
+Vec3 MbbrWorld::friction_limit_B(const MbbrMotion& m) const noexcept {
+  if (!world_.common.friction) return Vec3::Zero();
+  return friction_limit_N_m(world_, robot_.mu_c, MbbrDynamics::encoder_rate_B(m));
 }
 
 /// Per axis, the constant torque that would end this step at rest, limited to friction's: sticking and
@@ -105,15 +151,26 @@ Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Instant& free) const noex
   if (!world_.common.friction) return Vec3::Zero();
   const double h = world_.common.step_s;
   const State next = s + h * derivative(s, free);
-  const Vec3 limit = friction_limit_N_m(world_, robot_.mu_c, MbbrDynamics::encoder_rate_B(free.motion));
-  return uncoupled_coulomb_torque<3>(MbbrDynamics::encoder_rate_B(motion(next)), mobility_, h, limit);
+  return uncoupled_coulomb_torque<3>(MbbrDynamics::encoder_rate_B(motion(next)), mobility_, h,
+                                     friction_limit_B(free.motion));
 }
 
-Felt MbbrWorld::felt(const Instant& now) const noexcept {
+/// The same where the floor may give way: all axes, the slip and the spin together.
+MbbrFriction MbbrWorld::slip_friction(const State& s, const Instant& free, double h) const noexcept {
+  const auto mass = floor_.mass(free.motion);
+  const MbbrSlipAccelerations a = floor_.accelerations(free.motion, mass, free.loads, {});
+  const State next = s + h * slip_derivative(s, free.motion, a);
+  Vec<6> rates;
+  rates << MbbrDynamics::encoder_rate_B(motion(next)), next.segment<3>(kSlip);
+  const double normal = floor_.needed(free.motion, free.loads, felt_as_rolling(a, robot_.r)).normal_N;
+  return floor_.friction(free.motion, mass, rates, h, friction_limit_B(free.motion), normal);
+}
+
+Felt MbbrWorld::felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
   Felt felt;
   felt.time_s = time_s_;
-  felt.omega_B_rad_s = now.motion.omega_B;
-  felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(now.motion, now.a);
+  felt.omega_B_rad_s = m.omega_B;
+  felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(m, a);
   felt.wheel_angle_rad.head<3>() =
       kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) + drive_.encoder_offset_rad();
   return felt;
@@ -134,17 +191,48 @@ void MbbrWorld::disturb() {
   s_(kRelative + 2) -= v(2);
 }
 
+void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a,
+                            double h) noexcept {
+  if (!drive_.slips()) return;
+  const Vec3 total_B = now.viscous_B + friction_B;
+  const Vec3 force_B = -robot_.m_t * dynamics_.accelerometer_B(now.motion, a, Vec3(0.0, 0.0, robot_.l));
+  drive_.slip_over(motors_, now.wheel_torque, total_B, h);
+  drive_.carry(force_B - now.loads.push_B, now.wheel_torque, total_B);
+}
+
 void MbbrWorld::step(double h) noexcept {
   drive_.begin_step(motors_, MbbrDynamics::encoder_rate_B(motion(s_)),
                     kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
   const Vec2 push = push_now();
-  const Instant free = without_coulomb(s_, push);
-  const Vec3 friction = coulomb_torque_B(s_, free);
-  const Instant now = with_torque(free, friction);
-  if (sensors_.aged()) sensors_.feel(felt(now));
-  s_ = rk4_step(s_, derivative(s_, now), h, [&](const State& s) {
-    return derivative(s, with_torque(without_coulomb(s, push), friction));
-  });
+  const Instant free = rolling(s_, push, Vec3::Zero());
+  if (!slipping_) {
+    friction_.axes_B = coulomb_torque_B(s_, free);
+    const Instant now = with_friction(free, friction_.axes_B);
+    slipping_ = floor_.limited() && !floor_.carries(floor_.needed(now.motion, now.loads, now.a));
+    if (!slipping_) {
+      if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
+      load_wheels(now, friction_.axes_B, now.a, h);
+      s_ = rk4_step(s_, derivative(s_, now), h,
+                    [&](const State& s) { return derivative(s, rolling(s, push, friction_.axes_B)); });
+      time_s_ += h;
+      return;
+    }
+  }
+  friction_ = slip_friction(s_, free, h);
+  const auto sliding = [&](const State& s) {
+    const Instant at = forces(s, push, friction_.axes_B);
+    return floor_.accelerations(at.motion, floor_.mass(at.motion), at.loads, friction_.floor);
+  };
+  const MbbrSlipAccelerations a = sliding(s_);
+  const MbbrAccelerations felt_a = felt_as_rolling(a, robot_.r);
+  if (sensors_.aged()) sensors_.feel(felt(free.motion, felt_a));
+  load_wheels(free, friction_.axes_B, felt_a, h);
+  s_ = rk4_step(s_, slip_derivative(s_, free.motion, a), h,
+                [&](const State& s) { return slip_derivative(s, motion(s), sliding(s)); });
+  if (friction_.floor_holds) {
+    s_.segment<3>(kSlip).setZero();
+    slipping_ = false;
+  }
   time_s_ += h;
 }
 
@@ -172,12 +260,23 @@ void MbbrWorld::advance(const MotorCommand& command) {
   motors_.update_battery(kinematics_.wheels_from_ball(MbbrDynamics::encoder_rate_B(motion(s_))));
 }
 
+Felt MbbrWorld::felt_now() const noexcept {
+  if (slipping_) {
+    const Instant now = forces(s_, push_now(), friction_.axes_B);
+    const MbbrSlipAccelerations a =
+        floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
+    return felt(now.motion, felt_as_rolling(a, robot_.r));
+  }
+  Instant now = rolling(s_, push_now(), Vec3::Zero());
+  if (!held_) now = with_friction(now, coulomb_torque_B(s_, now));
+  return felt(now.motion, now.a);
+}
+
 RawSample MbbrWorld::sense() {
   TrueMotion now;
   now.time_s = time_s_;
   now.theta_rad = s_.segment<3>(kTheta);
-  const Instant free = without_coulomb(s_, push_now());
-  const Felt here = felt(held_ ? free : with_torque(free, coulomb_torque_B(s_, free)));
+  const Felt here = felt_now();
   now.omega_B_rad_s = here.omega_B_rad_s;
   now.specific_force_B_m_s2 = here.specific_force_B_m_s2;
   if (held_) {

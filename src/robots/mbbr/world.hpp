@@ -7,12 +7,14 @@
 #include "equipoise/plant/sensors.hpp"
 #include "robots/mbbr/drive.hpp"
 #include "robots/mbbr/dynamics.hpp"
+#include "robots/mbbr/slipping.hpp"
 
 namespace equipoise {
 
 struct MbbrWorldParams {
   WorldParams common;
   MbbrDriveParams drive;
+  MbbrFloorParams floor;
   double coulomb_scale = 1.0;        // of the identified friction
   double extra_viscous_N_m_s = 0.0;  // support balls, rollers
   Vec2 yaw_friction_scale{1.0,
@@ -42,26 +44,36 @@ class MbbrWorld {
   double time_s() const noexcept { return time_s_; }
   bool held() const noexcept { return held_; }
   double battery_V() const noexcept { return motors_.battery_V(); }
+  bool slipping() const noexcept { return slipping_; }  // the ball on the floor
 
  private:
-  /// Attitude, body rates, ball rates (yaw frame), ball angles (inertial), relative ball angle; 3 + 3 + 2 + 2
-  /// + 3.
-  using State = Vec<13>;
+  /// Attitude, body rates, ball rates (yaw frame), ball angles (inertial, of its centre's path), relative
+  /// ball angle, slip of the floor contact (yaw frame, m/s), spin; 3 + 3 + 2 + 2 + 3 + 2 + 1.
+  using State = Vec<16>;
   /// The forces of one instant and what they do.
   struct Instant {
     MbbrMotion motion;
+    Vec3 wheel_torque;
+    Vec3 viscous_B;
+    MbbrLoads loads;
     MbbrMass mass;
     MbbrAccelerations a;
   };
   static MbbrMotion motion(const State& s) noexcept;
-  Instant without_coulomb(const State& s, const Vec2& push_W) const noexcept;
-  Instant with_torque(const Instant& free, const Vec3& torque_B) const noexcept;
+  Instant forces(const State& s, const Vec2& push_W, const Vec3& friction_B) const noexcept;
+  Instant rolling(const State& s, const Vec2& push_W, const Vec3& friction_B) const noexcept;
+  Instant with_friction(const Instant& free, const Vec3& friction_B) const noexcept;
   State derivative(const State& s, const Instant& now) const noexcept;
+  State slip_derivative(const State& s, const MbbrMotion& m, const MbbrSlipAccelerations& a) const noexcept;
+  Vec3 friction_limit_B(const MbbrMotion& m) const noexcept;
   Vec3 coulomb_torque_B(const State& s, const Instant& free) const noexcept;
-  Vec2 slope_pull_star(double theta_z) const noexcept;
+  MbbrFriction slip_friction(const State& s, const Instant& free, double h) const noexcept;
+  Vec2 pull_star(const State& s) const noexcept;
   Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
-  Felt felt(const Instant& now) const noexcept;
+  Felt felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
+  Felt felt_now() const noexcept;
   void step(double h) noexcept;
+  void load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a, double h) noexcept;
   void disturb();
 
   MbbrParameters robot_;
@@ -71,11 +83,14 @@ class MbbrWorld {
   Vec3 mobility_;
   MbbrDrive::Motors motors_;
   MbbrDrive drive_;
+  MbbrSlipping floor_;
   NoiseStream start_noise_, process_noise_;
   State s_;
   SimulatedSensors sensors_;
   double time_s_ = 0.0;
   bool held_ = true;
+  bool slipping_ = false;
+  MbbrFriction friction_;  // of the last step
 };
 
 }  // namespace equipoise

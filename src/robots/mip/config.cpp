@@ -173,6 +173,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
     c.world[i] = read_mip_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
   }
   world.finish();
+  if (root.has("population")) root.table("population");  // read when a robot is drawn
   root.finish();
   loaded.sha256 = document.sha256();
   loaded.toml = document.canonical();

@@ -1,10 +1,14 @@
 #include "robots/mip/world.hpp"
 
+#include <algorithm>
+
 #include "equipoise/plant/coulomb.hpp"
 #include "equipoise/plant/integrator.hpp"
 
 namespace equipoise {
 namespace {
+
+constexpr double kRollingStart_m_s = 0.005;  // below it rolling resistance fades
 
 enum At : int { kTheta, kPhi, kPsi, kThetaDot, kPhiDot, kPsiDot, kPosition };
 
@@ -77,12 +81,16 @@ Vec3 MipWorld::accelerations(const State& s, const Vec2& wheel_torque) const noe
   Vec3 a = dynamics_.accelerations(motion(s), wheel_torque.sum(), wheel_torque.x() - wheel_torque.y());
   const Vec2 push_W = push_force_W(world_.common, time_s_);
   const Vec2& slope = world_.common.floor_slope_rad;
-  if (!push_W.isZero(0.0) || !slope.isZero(0.0)) {
+  const double resistance = world_.common.rolling_resistance;
+  if (!push_W.isZero(0.0) || !slope.isZero(0.0) || resistance != 0.0) {
     // Force along the rolling direction at the centre of mass: power F (r (phi' + theta') + l cos theta'),
     // with the axle's speed along -y. On a slope the whole weight pulls the axle downhill.
     const Vec2 weight_W = -(robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2 * slope;
     const double forward = -rotate(-s(kPsi), push_W).y();
-    const double downhill = -rotate(-s(kPsi), weight_W).y();
+    const double speed = robot_.r * (s(kPhiDot) + s(kThetaDot));  // along the rolling direction
+    const double weight_N = (robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2;
+    const double held_back = resistance * weight_N * speed / std::max(std::abs(speed), kRollingStart_m_s);
+    const double downhill = -rotate(-s(kPsi), weight_W).y() - held_back;
     const double c = std::cos(s(kTheta));
     const double lm = robot_.l * robot_.m_b;
     const double m22 = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;

@@ -1,0 +1,118 @@
+#include "config/population.hpp"
+
+#include <array>
+#include <cstdio>
+
+#include "config/toml_reader.hpp"
+
+namespace equipoise::config {
+namespace {
+
+std::uint64_t splitmix64(std::uint64_t z) noexcept {
+  z += 0x9E3779B97F4A7C15ULL;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
+  return z ^ (z >> 31);
+}
+
+double unit(std::int64_t robot, const std::string& key, std::uint64_t element) noexcept {
+  std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
+  for (const char c : key) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
+  const std::uint64_t bits =
+      splitmix64(splitmix64(hash ^ splitmix64(static_cast<std::uint64_t>(robot))) + element);
+  return static_cast<double>(bits >> 11) * 0x1p-53;
+}
+
+/// [low, high] uniform, or {sigma = s} about zero.
+struct Range {
+  bool uniform = true;
+  double low = 0.0;
+  double high = 0.0;  // or sigma
+};
+
+bool is_sigma(const toml::table& table) { return table.size() == 1 && table.contains("sigma"); }
+
+Range range_of(const toml::node& node, const std::string& name) {
+  if (const toml::table* table = node.as_table()) {
+    const auto sigma = (*table)["sigma"].value<double>();
+    if (!sigma || *sigma < 0.0) throw ConfigError(name + ": expected {sigma = number >= 0}");
+    return {false, 0.0, *sigma};
+  }
+  const toml::array* pair = node.as_array();
+  const bool two = pair != nullptr && pair->size() == 2;
+  const auto low = two ? pair->get(0)->value<double>() : std::nullopt;
+  const auto high = two ? pair->get(1)->value<double>() : std::nullopt;
+  if (!low || !high || *low > *high) throw ConfigError(name + ": expected [low, high] or {sigma = number}");
+  return {true, *low, *high};
+}
+
+/// Walks the population beside the world's table of the same shape.
+void draw(const toml::table& ranges, const toml::table& world, const std::string& prefix, std::int64_t robot,
+          std::vector<Drawn>* drawn) {
+  for (const auto& [name, node] : ranges) {
+    const std::string key = prefix + std::string(name.str());
+    const toml::node* target = world.get(name.str());
+    if (target == nullptr) throw ConfigError("population." + key + ": the world has no such key");
+    const toml::table* nested = node.as_table();
+    if (nested != nullptr && !is_sigma(*nested)) {
+      if (!target->is_table()) throw ConfigError("population." + key + ": is no table in the world");
+      draw(*nested, *target->as_table(), key + ".", robot, drawn);
+      continue;
+    }
+    const Range range = range_of(node, "population." + key);
+    const std::size_t count = target->is_array() ? target->as_array()->size() : 1;
+    Drawn d{key, {}};
+    for (std::size_t i = 0; i < count; ++i) {
+      d.values.push_back(range.uniform ? range.low + (range.high - range.low) * unit_draw(robot, key, i)
+                                       : range.high * normal_draw(robot, key, i));
+    }
+    drawn->push_back(std::move(d));
+  }
+}
+
+std::string exact(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.17g", value);
+  return text.data();
+}
+
+}  // namespace
+
+double unit_draw(std::int64_t robot, const std::string& key, std::size_t element) noexcept {
+  return unit(robot, key, static_cast<std::uint64_t>(element) << 8U);
+}
+
+double normal_draw(std::int64_t robot, const std::string& key, std::size_t element) noexcept {
+  double sum = -6.0;
+  for (std::uint64_t i = 1; i <= 12; ++i)
+    sum += unit(robot, key, (static_cast<std::uint64_t>(element) << 8U) + i);
+  return sum;
+}
+
+std::vector<Drawn> draw_robot(const std::string& path, const std::vector<std::string>& overrides,
+                              const std::string& world, std::int64_t robot) {
+  std::vector<Drawn> drawn;
+  if (robot == 0) return drawn;
+  const Document document(path, overrides);
+  const toml::table* ranges = document.root()["population"].as_table();
+  if (ranges == nullptr) throw ConfigError(path + ": population: missing; robots are drawn from it");
+  const toml::table* target = document.root()["world"][world].as_table();
+  if (target == nullptr) throw ConfigError(path + ": world." + world + ": missing");
+  draw(*ranges, *target, "", robot, &drawn);
+  return drawn;
+}
+
+std::vector<std::string> with_robot_drawn(const std::vector<Drawn>& drawn, const std::string& world,
+                                          const std::vector<std::string>& overrides) {
+  std::vector<std::string> all;
+  for (const Drawn& d : drawn) {
+    std::string value;
+    for (const double v : d.values) value += (value.empty() ? "" : ", ") + exact(v);
+    if (d.values.size() > 1) value = "[" + value + "]";
+    all.push_back("world." + world + "." + d.key + "=" + value);
+  }
+  all.insert(all.end(), overrides.begin(), overrides.end());
+  return all;
+}
+
+}  // namespace equipoise::config

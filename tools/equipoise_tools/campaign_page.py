@@ -1,0 +1,169 @@
+"""The page of a campaign: tables, pictures, and the command that runs each of the worst cases again."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+
+from .campaign_statistics import influences, survival_over_time, wilson
+
+WORST = 12
+
+
+def _column(rows: list[dict], key: str) -> np.ndarray:
+    return np.array([np.nan if row.get(key) is None else row[key] for row in rows], dtype=float)
+
+
+def points_of(rows: list[dict]) -> list[tuple[float, float]]:
+    return sorted({(row["yaw_hz"], row["drive_mps"]) for row in rows})
+
+
+def at_point(rows: list[dict], point: tuple[float, float]) -> list[dict]:
+    return [row for row in rows if (row["yaw_hz"], row["drive_mps"]) == point]
+
+
+def replay_command(row: dict, settings: dict) -> str:
+    """One line that runs this trial again, with a log."""
+    words = ["build/host/equipoise", "sim", "--config", settings["config"], "--fidelity", settings["fidelity"]]
+    for flag, key in (("--robot", "robot"), ("--seed", "seed"), ("--yaw-hz", "yaw_hz"), ("--drive-mps", "drive_mps")):
+        words += [flag, f"{row[key]:g}" if isinstance(row[key], float) else str(row[key])]
+    words += ["--duration-s", f"{row['duration_s']:g}"]
+    for choice in ("estimator", "controller"):
+        if settings.get(choice):
+            words += [f"--{choice}", settings[choice]]
+    for text in settings["set"]:
+        words += ["--set", text]
+    return shlex.join(words)
+
+
+def why(row: dict) -> str:
+    """It fell although its motors ran, or they went off."""
+    return ", ".join(row["reasons"]) or row["ended"]
+
+
+def worse_half(rows: list[dict]) -> tuple[np.ndarray, str]:
+    """Which rows to tell from the others, and what they are called."""
+    fell = np.array([row["fell"] for row in rows])
+    if fell.any():
+        return fell, "fallen"
+    attitude = _column(rows, "attitude_rmse_rad")
+    return attitude >= np.quantile(attitude, 0.9), "worst tenth in attitude"
+
+
+def drawn_of(rows: list[dict]) -> dict[str, np.ndarray]:
+    names = sorted({name for row in rows for name in row["drawn"]})
+    return {name: np.array([row["drawn"].get(name, np.nan) for row in rows]) for name in names}
+
+
+def survival_table(rows: list[dict]) -> list[str]:
+    lines = [
+        "| yaw Hz | m/s | trials | upright | 95 % interval | attitude RMSE rad, median / p95 |",
+        "|---|---|---|---|---|---|",
+    ]
+    for yaw, drive in points_of(rows):
+        here = at_point(rows, (yaw, drive))
+        upright = sum(not row["fell"] for row in here)
+        low, high = wilson(upright, len(here))
+        attitude = _column([row for row in here if not row["fell"]], "attitude_rmse_rad")
+        errors = f"{np.median(attitude):.4f} / {np.quantile(attitude, 0.95):.4f}" if len(attitude) else "-"
+        lines.append(
+            f"| {yaw:g} | {drive:g} | {len(here)} | {100 * upright / len(here):.2f} % | "
+            f"{100 * low:.2f} - {100 * high:.2f} % | {errors} |"
+        )
+    return lines
+
+
+def draw_pictures(rows: list[dict], out: Path) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, (over_yaw, over_time) = plt.subplots(1, 2, figsize=(11, 4.2))
+    for speed in sorted({drive for _, drive in points_of(rows)}):
+        points = [p for p in points_of(rows) if p[1] == speed]
+        counts = [(sum(not r["fell"] for r in at_point(rows, p)), len(at_point(rows, p))) for p in points]
+        shares = np.array([100 * k / n for k, n in counts])
+        bounds = np.array([[100 * x for x in wilson(k, n)] for k, n in counts])
+        spread = np.maximum(0.0, np.abs(bounds.T - shares))
+        yaw = [p[0] for p in points]
+        over_yaw.errorbar(yaw, shares, yerr=spread, marker="o", capsize=3, label=f"{speed:g} m/s")
+    over_yaw.set(xlabel="yaw rate, Hz", ylabel="upright to the end, %", ylim=(-2, 102))
+    over_yaw.legend()
+    for point in points_of(rows):
+        here = at_point(rows, point)
+        duration = max(row["duration_s"] for row in here)
+        times, left = survival_over_time(_column(here, "fell_at_s"), duration)
+        over_time.step(times, 100 * left, where="post", label=f"{point[0]:g} Hz, {point[1]:g} m/s")
+    over_time.set(xlabel="time, s", ylabel="still upright, %", ylim=(-2, 102))
+    over_time.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(out / "survival.png", dpi=110)
+    plt.close(figure)
+
+    worse, name = worse_half(rows)
+    strongest = influences(drawn_of(rows), worse)[:12][::-1]
+    if strongest:
+        figure, axes = plt.subplots(figsize=(8, 4.5))
+        axes.barh([f"{i.name} ({i.measure})" for i in strongest], [i.z for i in strongest])
+        axes.axvspan(-2, 2, color="0.9", zorder=0)
+        axes.set(xlabel=f"standard deviations by which the {name} differ (grey: chance)")
+        figure.tight_layout()
+        figure.savefig(out / "sensitivity.png", dpi=110)
+        plt.close(figure)
+
+
+def page(rows: list[dict], settings: dict) -> str:
+    robots = len({row["robot"] for row in rows})
+    fell = [row for row in rows if row["fell"]]
+    lines = [
+        "# Campaign",
+        f"{len(rows)} trials of {robots} robots drawn from `[population]` of {settings['config']}, world "
+        f"`{settings['fidelity']}`, {settings['duration_s']:g} s each; version {settings['version']}. "
+        f"{len(rows) - len(fell)} upright to the end, {len(fell)} not.",
+        "",
+        *survival_table(rows),
+        "",
+        "![survival](survival.png)",
+        "",
+    ]
+    if fell:
+        counts: dict[str, int] = {}
+        for row in fell:
+            reason = why(row)
+            counts[reason] = counts.get(reason, 0) + 1
+        lines += ["## Why the motors went off", "| reasons | trials |", "|---|---|"]
+        lines += [f"| {reason} | {n} |" for reason, n in sorted(counts.items(), key=lambda item: -item[1])]
+        lines.append("")
+    worse, name = worse_half(rows)
+    strongest = [i for i in influences(drawn_of(rows), worse) if abs(i.z) > 2.0][:10]
+    lines += [
+        "## Which imperfection it is",
+        f"The {name} against the others. Effect: chance that one of them has more of it (0.5: no matter).",
+        "",
+        "| imperfection | measure | effect | standard deviations |",
+        "|---|---|---|---|",
+        *[f"| `{i.name}` | {i.measure} | {i.effect:.2f} | {i.z:+.1f} |" for i in strongest],
+        "",
+        "![sensitivity](sensitivity.png)",
+        "",
+        "## Worst cases",
+    ]
+    survivors = [row for row in rows if not row["fell"]]
+    worst = sorted(fell, key=lambda row: row["fell_at_s"])
+    worst += sorted(survivors, key=lambda row: -(row["attitude_rmse_rad"] or 0.0))
+    for row in worst[:WORST]:
+        what = f"fell at {row['fell_at_s']:.2f} s ({why(row)})" if row["fell"] else "upright"
+        attitude = row["attitude_rmse_rad"]
+        errors = "" if row["fell"] or attitude is None else f", attitude {attitude:.4f} rad"
+        lines.append(f"- robot {row['robot']}: {what}{errors}: `{replay_command(row, settings)}`")
+    return "\n".join(lines) + "\n"
+
+
+def write_page(rows: list[dict], settings: dict, out: Path) -> Path:
+    draw_pictures(rows, out)
+    path = out / "campaign.md"
+    path.write_text(page(rows, settings))
+    return path
