@@ -94,7 +94,7 @@ SafetyParams read_safety(Section s) {
 
 Chain read_chain(Section s) {
   Chain c;
-  c.gyro_delay_s = s.number("gyro_delay_s", 0.0, 0.02);
+  c.gyro_delay_s = s.number("gyro_delay_s", 0.0, 0.01);  // two ticks: the filter's memory
   c.accel_delay_s = s.number("accel_delay_s", 0.0, 0.02);
   c.attitude_delay_s = s.number("attitude_delay_s", 0.0, 0.02);
   c.actuation_delay_s = s.number("actuation_delay_s", 0.0, 0.999 * kTickS);

@@ -39,6 +39,11 @@ void allow_another_robot(SafetyParams* safety) {
   safety->max_innovation = std::max(safety->max_innovation, safety->max_innovation_published);
 }
 
+/// What the firmware is told of the simulated IMU: its register, not what this chip makes of it.
+double gyro_delay_s(const WorldParams& world) {
+  return world.imu_low_pass > 0 ? imu_gyro_delay_s(world.imu_low_pass) : 0.0;
+}
+
 }  // namespace
 
 MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choice) {
@@ -53,11 +58,12 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   if (config.estimators.active == MbbrEstimatorId::kEkf13Published)
     config.safety.max_innovation = config.safety.max_innovation_published;
   if (choice.backend == "lockstep") allow_another_robot(&config.safety);
-  // In simulation the firmware is configured for the robot it is on: the level's bridge, and no compensation
+  // In simulation the firmware is configured for the robot it is on: the level's bridge and IMU, no compensation
   // of absent friction.
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
+    config.estimators.ekf.sensor_age_s = gyro_delay_s(config.world[i].common);
     if (!config.world[i].common.friction) config.friction.gain = 0.0;
     if (config.world[i].common.gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;
   }
@@ -78,6 +84,7 @@ MipConfig MipFirmware::apply(const MipConfig& configured, const Choice& choice) 
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
+    config.estimators.ekf.sensor_age_s = gyro_delay_s(config.world[i].common);
     if (!config.world[i].common.friction) config.friction.gain = 0.0;
     if (config.world[i].common.gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;
   }

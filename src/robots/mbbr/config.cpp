@@ -90,7 +90,6 @@ MbbrEkf::Params read_ekf(Section s) {
   p.filter.input_variance = s.vector<3>("input_variance", 0.0, 100.0);
   p.filter.initial_variance = s.vector<n>("initial_sigma", 0.0, 30.0).cwiseAbs2();
   p.disturbance_time_constant_s = s.number("disturbance_time_constant_s", kTickS, 1e6);
-  p.sensor_age_s = s.number("sensor_age_s", 0.0, TimeBase<3, 3>::kMaxAge_s);
   p.push_nis = s.number("push_nis", 1.0, 1e9);
   p.push_tilt_rate_variance = s.number("push_tilt_rate_variance", 0.0, 100.0);
   p.push_ball_rate_variance = s.number("push_ball_rate_variance", 0.0, 1000.0);
@@ -183,6 +182,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
 
   c.chain = config::read_chain(root.table("chain"));
+  c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {

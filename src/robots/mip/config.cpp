@@ -45,7 +45,6 @@ MipEkf::Params read_ekf(Section s) {
   p.filter.input_variance = s.vector<2>("input_variance", 0.0, 100.0);
   p.filter.initial_variance = s.vector<n>("initial_sigma", 0.0, 30.0).cwiseAbs2();
   p.disturbance_time_constant_s = s.number("disturbance_time_constant_s", kTickS, 1e6);
-  p.sensor_age_s = s.number("sensor_age_s", 0.0, TimeBase<2, 2>::kMaxAge_s);
   s.finish();
   return p;
 }
@@ -167,6 +166,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
   c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
 
   c.chain = config::read_chain(root.table("chain"));
+  c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
 
   Section world = root.table("world");
   for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
