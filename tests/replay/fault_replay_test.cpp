@@ -5,8 +5,9 @@
 #include <filesystem>
 
 #include "app/evaluate/fault_run.hpp"
-#include "app/log/replay.hpp"
+#include "app/log/replay_as.hpp"
 #include "equipoise/runtime/telemetry.hpp"
+#include "robots/robots.hpp"
 #include "support/trial.hpp"
 
 namespace equipoise {
@@ -61,8 +62,7 @@ Recorded record(const std::string& path, FaultKind fault, app::Phase phase, std:
 
 template <class Firmware>
 class FaultReplay : public testing::Test {};
-using Robots = testing::Types<app::MbbrFirmware, app::MipFirmware>;
-TYPED_TEST_SUITE(FaultReplay, Robots);
+TYPED_TEST_SUITE(FaultReplay, TestRobots);
 
 TYPED_TEST(FaultReplay, IsBitExactWhereTheRuntimeIntervened) {
   const std::string path = testing::TempDir() + "fault-replay-" + TypeParam::kName + ".lcm";
@@ -79,7 +79,7 @@ TYPED_TEST(FaultReplay, IsBitExactWhereTheRuntimeIntervened) {
         EXPECT_NE(recorded.inhibit, 0U) << "the runtime did not intervene";
       }
       app::RunLog log(path);
-      const app::Replay replay = app::replay_log(log, path, "");
+      const app::Replay replay = app::replay_as<TypeParam>(log, path, "");
       EXPECT_GE(replay.ticks, 780);
       EXPECT_TRUE(replay.identical()) << "tick " << replay.difference.tick << " " << replay.difference.field;
     }
