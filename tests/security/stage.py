@@ -173,10 +173,14 @@ class Flown:
         while True:
             if self.upright.is_set() and robot.held:
                 robot.theta = np.array([0.01, 0.0, 0.0])
+            if not self.enabled and not robot.held:  # a hand catches it
+                robot.held, robot.omega, robot.phi_dot = True, np.zeros(3), np.zeros(3)
+                robot.omega_dot, robot.phi_ddot = np.zeros(3), np.zeros(3)
+                robot.theta = np.array([0.01, 0.0, 0.0])
             message = robot.sensors(step)
             message.last = self.stopped.is_set()
-            connection.send(message.encode())
             try:
+                connection.send(message.encode())
                 motors = equipoise.lockstep_motors_t.decode(connection.recv(512))
             except (OSError, ValueError):
                 return
