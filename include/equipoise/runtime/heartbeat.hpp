@@ -21,7 +21,7 @@ static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
                   std::atomic<std::int64_t>::is_always_lock_free,
               "shared between processes");
 
-/// The guard polls at twice the tick's rate and yields to the loop: silent for six ticks, it is dead.
+/// The guard polls at four times the tick's rate and yields to the loop: silent for six ticks, it is dead.
 inline constexpr std::int64_t kGuardSilent_ns = 30'000'000;
 
 /// A count that has not moved for too long belongs to somebody who is dead, stopped or hanging.

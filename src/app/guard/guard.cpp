@@ -24,7 +24,7 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
   bool on = false;
   bool cut = false;  // and the loop has not answered by letting go
   end.error = bridges.off();
-  const std::int64_t poll_ns = options.period_ns / 2;
+  const std::int64_t poll_ns = options.period_ns / 4;  // seen late by one, acted on late by another
   std::int64_t due_ns = runtime::monotonic_now_ns();
   std::int64_t next_watchdog_ns = 0;
   while (!stop.load(std::memory_order_relaxed)) {
