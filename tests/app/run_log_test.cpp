@@ -152,6 +152,17 @@ TEST(FieldList, IsWhatTheLcmTypesDeclare) {
   expect_same_layout(fields::Run{}, runtime::RunInfo{});
 }
 
+TEST(FieldList, HoldsEveryByteOfASampleAndOfAState) {
+  std::size_t bytes = 0;
+  const auto add = [&bytes](const char*, const char*, const auto& value) { bytes += sizeof value; };
+  const TickRecord tick{};
+  fields::Sensors::visit(tick, add);
+  EXPECT_EQ(bytes, sizeof(RawSample));
+  bytes = 0;
+  fields::State::visit(tick.estimate, add);
+  EXPECT_EQ(bytes, sizeof(runtime::StateRecord));
+}
+
 TEST(FieldList, EncodesWhatGeneratedCodeDecodes) {
   expect_generated_code_agrees<sensors_t>(fields::Sensors{}, TickRecord{});
   expect_generated_code_agrees<command_t>(fields::CommandFields{}, TickRecord{});
