@@ -130,7 +130,9 @@ class Pace {
 template <class Firmware>
 int run(Arguments a) {
   complete<Firmware>(a.choice);
-  const typename Firmware::Loaded loaded = Firmware::load(a.config, a.set);
+  const typename Firmware::Loaded loaded = Firmware::load(
+      a.config, config::with_robot_drawn(config::draw_robot(a.config, a.set, a.choice.fidelity, a.robot),
+                                         a.choice.fidelity, a.set));
   if (a.log.empty()) a.log = new_log_name("sim", Firmware::kName);
 
   runtime::TelemetryOptions telemetry_options;
