@@ -92,7 +92,7 @@ double normal_draw(std::int64_t robot, const std::string& key, std::size_t eleme
 std::vector<Drawn> draw_robot(const std::string& path, const std::vector<std::string>& overrides,
                               const std::string& world, std::int64_t robot) {
   std::vector<Drawn> drawn;
-  if (robot == 0) return drawn;
+  if (robot <= 0) return drawn;
   const Document document(path, overrides);
   const toml::table* ranges = document.root()["population"].as_table();
   if (ranges == nullptr) throw ConfigError(path + ": population: missing; robots are drawn from it");

@@ -1,7 +1,7 @@
-"""python -m equipoise_tools.campaign: Monte Carlo over robots, seeds and commands on Dask; see tools/campaign --help.
+"""Monte Carlo over robots, seeds and commands on Dask; see tools/campaign --help.
 
-A chunk of trials is one call of `equipoise trials`; a finished chunk is one Parquet file, so that an interrupted
-campaign goes on where it was.
+A chunk of trials is one call of `equipoise trials`; a finished chunk is one Parquet file, so that an
+interrupted campaign goes on where it was.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ def identity(trial: dict) -> tuple:
 
 def plan(robots: range, seeds: range, runs: list[tuple[float, float]], settings: dict) -> list[dict]:
     """Every trial, one robot after the other, so that a part of the list is a smaller campaign."""
-    common = {key: settings[key] for key in ("duration_s", "fidelity", "estimator", "controller") if settings[key]}
+    common = {
+        key: settings[key] for key in ("duration_s", "fidelity", "estimator", "controller") if settings[key]
+    }
     return [
         {"robot": robot, "seed": seed, "yaw_hz": yaw, "drive_mps": drive, **common}
         for robot in robots
@@ -78,7 +80,9 @@ def read_parts(folder: Path) -> list[dict]:
     for path in sorted(folder.glob("trials-*.parquet")):
         for flat in pyarrow.parquet.read_table(path).to_pylist():
             row = {key: value for key, value in flat.items() if not key.startswith("drawn.")}
-            row["drawn"] = {key[6:]: v for key, v in flat.items() if key.startswith("drawn.") and v is not None}
+            row["drawn"] = {
+                key[6:]: v for key, v in flat.items() if key.startswith("drawn.") and v is not None
+            }
             rows.append(row)
     return rows
 
@@ -109,7 +113,7 @@ class Progress:
         left_s = (self.total - self.done) / max(rate, 1e-9)
         end = "\r" if sys.stderr.isatty() and self.done < self.total else "\n"
         print(
-            f"[{bar:30s}] {self.done}/{self.total}, {self.fell} fell, {rate:.1f} trials/s, {left_s:.0f} s left ",
+            f"[{bar:30s}] {self.done}/{self.total}, {self.fell} fell, {rate:.1f}/s, {left_s:.0f} s left ",
             end=end,
             file=sys.stderr,
             flush=True,
@@ -126,7 +130,11 @@ def run_missing(missing: list[dict], settings: dict, given: argparse.Namespace, 
         client = Client(given.scheduler)
     else:  # a worker waits for a process of its own: threads will do
         cluster = LocalCluster(
-            n_workers=1, threads_per_worker=workers, processes=False, dashboard_address=None, protocol="inproc://"
+            n_workers=1,
+            threads_per_worker=workers,
+            processes=False,
+            dashboard_address=None,
+            protocol="inproc://",
         )
         client = Client(cluster)
     try:
@@ -153,7 +161,9 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="tools/campaign", description=__doc__.splitlines()[0])
     parser.add_argument("--config", default="config/mbbr.toml")
     parser.add_argument("--robots", type=int, default=100)
-    parser.add_argument("--first-robot", type=int, default=1, help="others are held out of a tuning that used 1 to N")
+    parser.add_argument(
+        "--first-robot", type=int, default=1, help="others are held out of a tuning that used 1 to N"
+    )
     parser.add_argument("--runs", nargs="+", type=pair, default=[pair(run) for run in RUNS])
     parser.add_argument("--seeds", type=int, default=1, help="runs of each robot at each point")
     parser.add_argument("--duration-s", type=float, default=60.0)
@@ -176,7 +186,9 @@ def settings_of(given: argparse.Namespace) -> dict:
     path = path if path.exists() else repository_root() / given.config
     if not path.exists():
         raise UserError(f"{given.config}: cannot be opened")
-    version = subprocess.run([binary(), "--version"], capture_output=True, text=True, check=False).stdout.strip()
+    version = subprocess.run(
+        [binary(), "--version"], capture_output=True, text=True, check=False
+    ).stdout.strip()
     return {
         "config": given.config,
         "config_path": str(path.resolve()),

@@ -26,8 +26,20 @@ def at_point(rows: list[dict], point: tuple[float, float]) -> list[dict]:
 
 def replay_command(row: dict, settings: dict) -> str:
     """One line that runs this trial again, with a log."""
-    words = ["build/host/equipoise", "sim", "--config", settings["config"], "--fidelity", settings["fidelity"]]
-    for flag, key in (("--robot", "robot"), ("--seed", "seed"), ("--yaw-hz", "yaw_hz"), ("--drive-mps", "drive_mps")):
+    words = [
+        "build/host/equipoise",
+        "sim",
+        "--config",
+        settings["config"],
+        "--fidelity",
+        settings["fidelity"],
+    ]
+    for flag, key in (
+        ("--robot", "robot"),
+        ("--seed", "seed"),
+        ("--yaw-hz", "yaw_hz"),
+        ("--drive-mps", "drive_mps"),
+    ):
         words += [flag, f"{row[key]:g}" if isinstance(row[key], float) else str(row[key])]
     words += ["--duration-s", f"{row['duration_s']:g}"]
     for choice in ("estimator", "controller"):

@@ -1,4 +1,4 @@
-"""What a campaign says: intervals of a share, and which imperfection separates the fallen from the upright."""
+"""What a campaign says: intervals of a share; which imperfection separates fallen from upright."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Influence:
 
 
 def influences(drawn: dict[str, np.ndarray], worse: np.ndarray) -> list[Influence]:
-    """Of every drawn imperfection, the strongest first. `worse`: fallen, or the worst tenth where none fell."""
+    """Of every drawn imperfection, the strongest first. `worse`: those to tell from the others."""
     found = []
     for name, values in drawn.items():
         value = Influence(name, "value", *separation(values, worse))

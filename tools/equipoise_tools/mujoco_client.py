@@ -1,11 +1,11 @@
-"""MuJoCo behind `equipoise run --backend lockstep`: the MBBR with the board's IMU delay, [T]'s noise, floor grip 0.6.
+"""MuJoCo behind `equipoise run --backend lockstep`: the board's IMU delay, [T]'s noise, floor grip 0.6.
 
-    build/host/equipoise run --config config/mbbr.toml --backend lockstep --socket /tmp/mbbr.sock \
-        --set motor.bridge=drive_brake --set friction.compensation=0.0 --yaw-hz 1 --drive-mps 0.2 --duration-s 30 &
+    build/host/equipoise run --config config/mbbr.toml --backend lockstep --socket /tmp/mbbr.sock \\
+        --set motor.bridge=drive_brake --set friction.compensation=0.0 --yaw-hz 1 --drive-mps 0.2 &
     build/venv/bin/python -m equipoise_tools.mujoco_client /tmp/mbbr.sock --duration-s 30
 
-A floating body on a free ball that touches the floor; full rigid-body dynamics, so it spins, slides and tumbles as it
-will. Bridges are linear and the gears without friction, as the two --set say. Protocol: docs/lockstep.md.
+A floating body on a free ball that touches the floor: full rigid-body dynamics, so it spins, slides and
+tumbles as it will. Bridges are linear, gears without friction, as the two --set say (docs/lockstep.md).
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 
 from .lockstep_client import (
     DT,
-    G,
     I_BALL,
     I_BODY,
     I_WHEELS,
@@ -29,10 +28,11 @@ from .lockstep_client import (
     K2,
     M_BALL,
     M_BODY,
-    R,
     R_WHEEL,
     WHEEL_AXES,
+    G,
     L,
+    R,
 )
 from .paths import UserError, import_lcm_types
 
@@ -87,7 +87,9 @@ def quaternion_matrix(q: np.ndarray) -> np.ndarray:
 class Robot:
     """The engine's robot: `advance` with duties, `sensors` as the boundary wants them."""
 
-    def __init__(self, tilt_rad: float = 0.02, grip: float = 0.6, torsion_radius_m: float = 0.005, seed: int = 1):
+    def __init__(
+        self, tilt_rad: float = 0.02, grip: float = 0.6, torsion_radius_m: float = 0.005, seed: int = 1
+    ):
         self.mujoco = import_mujoco()
         self.model = self.mujoco.MjModel.from_xml_string(
             MODEL.format(
@@ -139,7 +141,9 @@ class Robot:
             self.data.qfrc_applied[6:9] = quaternion_matrix(self.data.qpos[7:11]).T @ torque
             self.mujoco.mj_step(self.model, self.data)
             self.wheels += STEP * (R / R_WHEEL) * WHEEL_AXES.T @ self.ball_rate_B()
-            self.past.appendleft((self.data.sensor("gyro").data.copy(), self.data.sensor("accel").data.copy()))
+            self.past.appendleft(
+                (self.data.sensor("gyro").data.copy(), self.data.sensor("accel").data.copy())
+            )
 
     def _late(self, which: int, delay_s: float) -> np.ndarray:
         steps = delay_s / STEP
@@ -199,7 +203,9 @@ def balance(path: str, duration_s: float, robot: Robot, fallen_rad: float = 0.6)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m equipoise_tools.mujoco_client", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m equipoise_tools.mujoco_client", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("socket", help="path given to equipoise run --socket")
     parser.add_argument("--duration-s", type=float, default=30.0)
     parser.add_argument("--grip", type=float, default=0.6, help="friction coefficient of the floor")
