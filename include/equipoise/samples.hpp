@@ -45,10 +45,10 @@ struct Measurement {
   bool encoders_ok = false;
   bool battery_ok = false;
   bool attitude_ok = false;
-  bool imu_gap = false;       // more samples were lost than may be
-  bool encoder_jump = false;  // further than a wheel can turn in a tick
-  bool bridge_fault = false;  // a bridge complains
-  bool all_finite = true;     // of the raw sample
+  bool imu_gap = false;                                    // more samples were lost than may be
+  bool encoder_jump = false;                               // further than a wheel can turn in a tick
+  bool bridge_fault = false;                               // a bridge complains
+  bool all_finite = true;                                  // of the raw sample
   std::array<bool, 3> gyro_axis_ok{true, true, true};      // beside imu_ok: an axis that is known to be dead
   std::array<bool, Wheels> wheel_ok = all_true<Wheels>();  // beside encoders_ok: a wheel that lies
 };

@@ -58,8 +58,8 @@ MbbrConfig MbbrFirmware::apply(const MbbrConfig& configured, const Choice& choic
   if (config.estimators.active == MbbrEstimatorId::kEkf13Published)
     config.safety.max_innovation = config.safety.max_innovation_published;
   if (choice.backend == "lockstep") allow_another_robot(&config.safety);
-  // In simulation the firmware is configured for the robot it is on: the level's bridge and IMU, no compensation
-  // of absent friction.
+  // In simulation the firmware is configured for the robot it is on: the level's bridge and IMU, no
+  // compensation of absent friction.
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
