@@ -81,6 +81,8 @@ void MbbrEkfModel::measure(const Vec<17>& x, const Vec3& u, Vec<8>& y, Mat<8, 17
   H(kGyro + 2, kThetaDotZ) *= shortened;
   H(kGyro + 2, kMountX) = -rate.y() - dx * rate.z();
   H(kGyro + 2, kMountY) = rate.x() - dy * rate.z();
+  H(kGyro + 2, kThetaX) -= dx * turn;
+  H(kGyro + 2, kThetaY) -= dy * turn;
   H(kGyro + 2, kThetaDotY) -= dx;
   H(kGyro + 2, kThetaDotX) += dy;
 

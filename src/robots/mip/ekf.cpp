@@ -88,7 +88,8 @@ void MipEkfModel::measure(const Vec<12>& x, const Vec2& u, Vec<6>& y, Mat<6, 12>
   H(kGyro + 1, kPsiDot) = x(kTheta) + dx;
   H(kGyro + 1, kMountX) = mount_ * turn;
   y(kGyro + 2) = turn * shortened - dx * across + dy * x(kThetaDot);
-  H(kGyro + 2, kPsiDot) = shortened;
+  H(kGyro + 2, kTheta) = -dx * turn;
+  H(kGyro + 2, kPsiDot) = shortened - dx * x(kTheta);
   H(kGyro + 2, kThetaDot) = dy;
   H(kGyro + 2, kMountX) = -mount_ * (across + dx * turn);
   H(kGyro + 2, kMountY) = mount_ * (x(kThetaDot) - dy * turn);
