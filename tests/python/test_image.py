@@ -5,6 +5,7 @@ import re
 import subprocess
 
 import pytest
+from equipoise_tools import device_tree
 
 
 def image(root, *arguments):
@@ -43,6 +44,45 @@ def test_the_loader_finds_what_the_image_holds(root):
     assert f"LABEL={label} / ext4" in customize
     for name in re.findall(r"^put \d+ (\S+)", customize, re.M):
         assert list((root / "packaging/image").glob(name.replace("$network", "*"))), name
+
+
+def test_the_console_is_the_port_that_debians_kernel_has(root):
+    """SERIAL_OMAP, not SERIAL_8250_OMAP: ttyO0."""
+    loader = (root / "packaging/image/extlinux.conf").read_text()
+    lines = re.findall(r"^\s*append (.*)$", loader, re.M)
+    assert len(lines) == 2
+    assert all("console=ttyO0,115200" in line and "default_governor=performance" in line for line in lines)
+
+
+def test_the_cards_own_module_list_does_not_hide_the_packages(root):
+    """A file of the same name in /etc would take the place of the one in /usr/lib."""
+    package = re.search(r"usr/lib/modules-load\.d/(\S+)", (root / "tools/package").read_text())[1]
+    card = re.search(r"etc/modules-load\.d/(\S+)\"", (root / "packaging/image/customize").read_text())[1]
+    assert package != card
+    assert "i2c-dev" in (root / "packaging/modules.conf").read_text().split()
+    # What the image must load by itself, its test does not load for it.
+    assert "i2c-dev" not in (root / "tests/hardware/image/bench").read_text()
+
+
+@pytest.mark.cross
+def test_the_cards_initramfs_holds_what_its_tree_asks_for(root):
+    kernel = next((root / "build/vm/kernel/lib/modules").iterdir())
+    subprocess.run(["depmod", "-b", root / "build/vm/kernel", kernel.name], check=True)
+    modules = device_tree.drivers(
+        device_tree.read(root / "build/vm/bookworm-boneblack.dtb"), (kernel / "modules.alias").read_text()
+    )
+    assert {"sdhci_omap", "omap_wdt", "tps65217"} <= set(modules)
+    found = {path.stem.replace("-", "_") for path in kernel.rglob("*.ko")}
+    built_in = (kernel / "modules.builtin").read_text().split()
+    found |= {name.rsplit("/", 1)[1].removesuffix(".ko").replace("-", "_") for name in built_in}
+    assert set(modules) <= found
+    assert {
+        "mmc_block",
+        "ext4",
+        "crc32c_generic",
+        "virtio_pci",
+        "virtio_blk",
+    } <= found  # tools/image adds them
 
 
 def test_the_service_of_a_fresh_card_waits_for_its_owner(root):
