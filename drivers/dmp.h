@@ -1,8 +1,8 @@
 /* dmp.h: the MPU-9250's Digital Motion Processor as an attitude source. Its firmware is proprietary and not
  * part of this project: the user supplies a file of exactly 3062 bytes. In: an opened mpu9250 with +-2000
- * deg/s and +-2 g (InvenSense's own driver) or +-8 g (librobotcontrol since 0.4.0). Out: unit quaternions R_WS at 200 Hz, newest only. dmp_parse is
- * pure; dmp_poll is real-time safe: it never sleeps, a FIFO reset is spread over ticks. Interface: InvenSense
- * eMD 5.1, image 6.12. */
+ * deg/s and +-2 g (InvenSense's own driver) or +-8 g (librobotcontrol since 0.4.0). Out: unit quaternions
+ * R_WS at 200 Hz, newest only. dmp_parse is pure; dmp_poll is real-time safe: it never sleeps, a FIFO reset
+ * is spread over ticks. Interface: InvenSense eMD 5.1, image 6.12. */
 #ifndef EQUIPOISE_DRIVERS_DMP_H
 #define EQUIPOISE_DRIVERS_DMP_H
 

@@ -34,7 +34,7 @@ enum mpu9250_bits {
   MPU9250_FIFO_ENABLE = 0x40,
   MPU9250_DMP_RESET = 0x08,
   MPU9250_FIFO_RESET = 0x04,
-  MPU9250_FIFO_1024 = 0x40,      /* ACCEL_CONFIG_2: 512 bytes after a reset; map of the MPU-6500 */
+  MPU9250_FIFO_1024 = 0x40, /* ACCEL_CONFIG_2: 512 bytes after a reset; map of the MPU-6500 */
   MPU9250_FIFO_SIZE_MASK = 0xC0,
 };
 

@@ -99,7 +99,7 @@ std::string Testbed::addLed(const std::string& name) {
 }
 
 std::string Testbed::addTty(const std::string& address, const std::string& name) {
-  return addDevice("tty", address + ".serial/tty/" + name, {{"uevent", ""}});
+  return addDevice("@tty", address + ".serial/tty/" + name, {{"uevent", ""}});
 }
 
 void Testbed::addImu(int bus) {

@@ -3,7 +3,7 @@
     python graft.py QEMU.dtb BOARD.dtb >machine.dts
 
 The real pinctrl-single and gpio-omap bind at the addresses they have on the AM335x; there QEMU has memory,
-which is taken away from the kernel. Whoever else claims pads is a bus without devices under its name and address.
+which is taken away from the kernel. Whoever else claims pads is a bus without devices at their addresses.
 """
 
 import re
@@ -52,7 +52,7 @@ def grafted(board: device_tree.Node) -> str:
         return f'pinctrl-names = "default"; pinctrl-0 = <{hexes(claimed)}>; ' if claimed else ""
 
     out = [
-        f'pinmux@{PINMUX:x} {{ compatible = "pinctrl-single"; reg = <0 {PINMUX:#x} 0 0x238>; '
+        f'pinmux@800 {{ compatible = "pinctrl-single"; reg = <0 {PINMUX:#x} 0 0x238>; '
         f"#pinctrl-cells = <{controller.cells('#pinctrl-cells')[0]}>; pinctrl-single,register-width = <32>; "
         f"pinctrl-single,function-mask = <0x7f>; {state(controller)}\n{groups}}};"
     ]
