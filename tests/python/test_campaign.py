@@ -72,7 +72,9 @@ def test_the_page_tells_shares_and_how_to_see_the_worst_again(tmp_path):
     assert "| 1 | 0.2 | 20 | 75.00 % |" in text
     first = next(line for line in text.splitlines() if line.startswith("- robot"))
     assert "robot 1: fell at 11.00 s (tilt)" in first
-    assert "sim --config config/mbbr.toml --fidelity full --robot 1 --seed 1 --yaw-hz 1 --drive-mps 0.2" in first
+    assert (
+        "sim --config config/mbbr.toml --fidelity full --robot 1 --seed 1 --yaw-hz 1 --drive-mps 0.2" in first
+    )
     assert "--set friction.compensation=0.9" in first
     assert "| `mount` |" in text
     assert (tmp_path / "survival.png").stat().st_size > 10_000
@@ -88,13 +90,27 @@ def test_an_interrupted_campaign_runs_only_what_is_missing(tmp_path, monkeypatch
         ran.extend(campaign.identity(trial) for trial in trials)
         if len(ran) > 6 and not resumed:
             raise campaign.UserError("the power went off")
-        return [row(t["robot"], False, x=0.5) | {k: t[k] for k in ("seed", "yaw_hz", "drive_mps")} for t in trials]
+        return [
+            row(t["robot"], False, x=0.5) | {k: t[k] for k in ("seed", "yaw_hz", "drive_mps")} for t in trials
+        ]
 
     resumed = False
     monkeypatch.setattr(campaign, "run_chunk", fake_chunk)
     monkeypatch.setattr(campaign, "settings_of", lambda given: SETTINGS)
     monkeypatch.setattr(campaign, "binary", lambda: "unused")
-    words = ["--robots", "5", "--runs", "0,0.1", "1,0.1", "--chunk", "3", "--workers", "1", "--out", str(tmp_path)]
+    words = [
+        "--robots",
+        "5",
+        "--runs",
+        "0,0.1",
+        "1,0.1",
+        "--chunk",
+        "3",
+        "--workers",
+        "1",
+        "--out",
+        str(tmp_path),
+    ]
     assert campaign.main(words) == 2
     kept = {campaign.identity(r) for r in campaign.read_parts(tmp_path)}
     assert 0 < len(kept) < 10
@@ -115,7 +131,14 @@ def test_bad_runs_are_refused():
 def trials(root, tmp_path, rows, *arguments):
     request = tmp_path / "trials.json"
     request.write_text(json.dumps({"trials": rows}))
-    command = [root / "build/host/equipoise", "trials", "--config", root / "config/mbbr.toml", "--in", request]
+    command = [
+        root / "build/host/equipoise",
+        "trials",
+        "--config",
+        root / "config/mbbr.toml",
+        "--in",
+        request,
+    ]
     return subprocess.run([*map(str, command), *arguments], capture_output=True, text=True, check=False)
 
 
@@ -132,9 +155,22 @@ def test_trials_have_the_same_bytes_on_one_thread_and_on_three(root, tmp_path):
 
 def test_a_trial_is_the_same_run_as_sim(root, tmp_path):
     rows = [{"robot": 2, "seed": 7, "duration_s": 6.0, "drive_mps": 0.1, "fidelity": "nominal"}]
-    trial = json.loads(trials(root, tmp_path, rows, "--set", "population.battery_V=[7.5, 7.6]").stdout)["trials"][0]
+    trial = json.loads(trials(root, tmp_path, rows, "--set", "population.battery_V=[7.5, 7.6]").stdout)[
+        "trials"
+    ][0]
     command = [root / "build/host/equipoise", "sim", "--config", root / "config/mbbr.toml", "--robot", "2"]
-    command += ["--seed", "7", "--duration-s", "6", "--drive-mps", "0.1", "--fidelity", "nominal", "--telemetry", "off"]
+    command += [
+        "--seed",
+        "7",
+        "--duration-s",
+        "6",
+        "--drive-mps",
+        "0.1",
+        "--fidelity",
+        "nominal",
+        "--telemetry",
+        "off",
+    ]
     command += ["--set", "population.battery_V=[7.5, 7.6]", "--log", tmp_path / "a.lcm", "--json", "-"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     sim = json.loads(done.stdout)

@@ -6,7 +6,9 @@ import subprocess
 import numpy as np
 import pytest
 
-pytest.importorskip("mujoco", reason="mujoco is not installed (tools/test installs tools/requirements-optional.txt)")
+pytest.importorskip(
+    "mujoco", reason="mujoco is not installed (tools/test installs tools/requirements-optional.txt)"
+)
 from equipoise_tools import mujoco_client  # noqa: E402
 
 PLAIN = ["--set", "motor.bridge=drive_brake", "--set", "friction.compensation=0.0"]
@@ -59,10 +61,19 @@ def test_the_gyro_is_late_and_the_encoders_are_not():
 @pytest.mark.slow
 def test_the_printed_feedback_balances_it(root, tmp_path):
     path = tmp_path / "io.sock"
-    command = [root / "build/host/equipoise", "run", "--config", root / "config/mbbr.toml", "--backend", "lockstep"]
+    command = [
+        root / "build/host/equipoise",
+        "run",
+        "--config",
+        root / "config/mbbr.toml",
+        "--backend",
+        "lockstep",
+    ]
     command += ["--socket", path, "--log", tmp_path / "run.lcm", "--telemetry", "off", "--json", "-"]
     command += [*PLAIN, "--controller", "thesis", "--estimator", "ekf13", "--timeout-s", "60"]
-    firmware = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    firmware = subprocess.Popen(
+        list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     result = mujoco_client.balance(str(path), 5.0, mujoco_client.Robot())
     out, err = firmware.communicate(timeout=120)
     assert firmware.returncode == 0, err
