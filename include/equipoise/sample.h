@@ -1,6 +1,6 @@
-/* sample.h: what the hardware boundary delivers and takes, in C: device counts in, signed duties out. The tick's
- * RawSample and MotorCommand are these structs. Doubles, so that a simulated device can be exact or deliver a NaN.
- * A zeroed struct is "nothing valid" and "motors off". */
+/* sample.h: what the hardware boundary delivers and takes, in C: device counts in, signed duties out. The
+ * tick's RawSample and MotorCommand are these structs. Doubles, so that a simulated device can be exact or
+ * deliver a NaN. A zeroed struct is "nothing valid" and "motors off". */
 #ifndef EQUIPOISE_SAMPLE_H
 #define EQUIPOISE_SAMPLE_H
 
