@@ -1,6 +1,6 @@
-// The firmware of each robot as sim, run and replay build it: configuration, choices, pipeline, tick record.
-// In: robot name, configuration, choices -> out: the pipeline that flies. One struct per robot; with_robot is
-// the only place that tells them apart. record_tick is RT-safe, the rest is start-up only.
+// What sim, run and replay share of a robot's firmware: checked choices, the log's first event, the tick's
+// record. In: configuration, choices, results -> out: the same as records. record_tick is RT-safe, the rest
+// is start-up only.
 #pragma once
 
 #include <optional>
@@ -10,126 +10,19 @@
 #include "equipoise/config.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/runtime/telemetry.hpp"
-#include "robots/mbbr/config.hpp"
-#include "robots/mbbr/world.hpp"
-#include "robots/mip/config.hpp"
+#include "robots/robots.hpp"
 
 namespace equipoise::app {
 
 /// Of this build.
 std::string version();
 
-/// What is chosen beside the configuration; in a log: run_t.
-struct Choice {
-  std::string estimator;
-  std::string controller;
-  std::string fidelity;  // of the simulated world; empty on hardware
-  bool compare = false;
-  std::string attitude{};  // dmp or own; empty: as configured
-  std::string backend{};   // of run; empty: sim
-};
-
-/// Index of a name of kFidelityNames; ConfigError when it is none.
-std::size_t fidelity_level(const std::string& name);
-
-struct MbbrFirmware {
-  using Robot = Mbbr;
-  using Config = MbbrConfig;
-  using Loaded = equipoise::Loaded<MbbrConfig>;
-  using World = MbbrWorld;
-  static constexpr const char* kName = "mbbr";
-  static constexpr const char* kDefaultEstimator = "ekf";
-  static constexpr const char* kDefaultController = "scheduled";
-  static constexpr const char* kSpeedRmseKey = "ball_speed_rmse_m_s";
-  static constexpr const char* kSpeedLabel = "ball speed RMSE";
-  static constexpr const char* kSpeedUnit = "cm/s";
-  static constexpr double kSpeedScale = 100.0;
-
-  static Loaded load(const std::string& path, const Overrides& overrides) {
-    return load_mbbr(path, overrides);
-  }
-  static Loaded parse(const std::string& text, const std::string& origin) { return parse_mbbr(text, origin); }
-  static std::vector<std::string> estimators() {
-    return {kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end()};
-  }
-  static std::vector<std::string> controllers() { return {"thesis", "scheduled"}; }
-  static double rolling_radius_m(const Config& c) { return c.robot.r; }
-
-  /// The configuration with the choices applied, as it flies.
-  static Config apply(const Config& configured, const Choice& choice);
-
-  /// f(pipeline); the controller decides its type.
-  template <class F>
-  static auto with_pipeline(const Config& config, const std::string& controller, F&& f) {
-    if (controller == "thesis") {
-      MbbrThesisPipeline pipeline(config.thesis_pipeline());
-      return f(pipeline);
-    }
-    MbbrScheduledPipeline pipeline(config.scheduled_pipeline());
-    return f(pipeline);
-  }
-
-  /// `config` as it flies; `level` of fidelity.
-  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
-    MbbrWorldParams params = config.world[level];
-    params.common.seed = seed;
-    return World(config.robot, config.motor, config.calibration, params);
-  }
-};
-
-struct MipFirmware {
-  using Robot = Mip;
-  using Config = MipConfig;
-  using Loaded = equipoise::Loaded<MipConfig>;
-  using World = MipWorld;
-  static constexpr const char* kName = "mip";
-  static constexpr const char* kDefaultEstimator = "ekf";
-  static constexpr const char* kDefaultController = "slc";
-  static constexpr const char* kSpeedRmseKey = "wheel_speed_rmse_rad_s";
-  static constexpr const char* kSpeedLabel = "wheel speed RMSE";
-  static constexpr const char* kSpeedUnit = "rad/s";
-  static constexpr double kSpeedScale = 1.0;
-
-  static Loaded load(const std::string& path, const Overrides& overrides) {
-    return load_mip(path, overrides);
-  }
-  static Loaded parse(const std::string& text, const std::string& origin) { return parse_mip(text, origin); }
-  static std::vector<std::string> estimators() {
-    return {kMipEstimatorNames.begin(), kMipEstimatorNames.end()};
-  }
-  static std::vector<std::string> controllers() { return {"slc", "lqr"}; }
-  static double rolling_radius_m(const Config& c) { return c.robot.r; }
-
-  /// The configuration with the choices applied, as it flies.
-  static Config apply(const Config& configured, const Choice& choice);
-
-  /// f(pipeline); the controller decides its type.
-  template <class F>
-  static auto with_pipeline(const Config& config, const std::string& controller, F&& f) {
-    if (controller == "slc") {
-      MipSlcPipeline pipeline(config.slc_pipeline());
-      return f(pipeline);
-    }
-    MipLqrPipeline pipeline(config.lqr_pipeline());
-    return f(pipeline);
-  }
-
-  /// `config` as it flies; `level` of fidelity.
-  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
-    MipWorldParams params = config.world[level];
-    params.common.seed = seed;
-    return World(config.robot, config.motor, config.calibration, params);
-  }
-};
-
-/// f(firmware) for the robot named `type`; ConfigError when there is none. `where`: file, for the message.
-template <class F>
-auto with_robot(const std::string& type, const std::string& where, F&& f) {
-  if (type == MbbrFirmware::kName) return f(MbbrFirmware{});
-  if (type == MipFirmware::kName) return f(MipFirmware{});
-  throw ConfigError(where + ": robot.type: \"" + type +
-                    "\" cannot be flown by this build; allowed: mbbr, mip");
-}
+// Of the robots, for what is qualified with app::.
+using equipoise::Choice;
+using equipoise::fidelity_level;
+using equipoise::MbbrFirmware;
+using equipoise::MipFirmware;
+using equipoise::with_robot;
 
 /// Of all robots, for help texts: "mbbr: a, b".
 std::string known_estimators();

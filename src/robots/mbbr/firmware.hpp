@@ -1,0 +1,62 @@
+// The MBBR as sim, run and replay build it: names, defaults, configuration, pipeline, world. One line of
+// robots/robots.hpp names it. Start-up only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "robots/choice.hpp"
+#include "robots/mbbr/config.hpp"
+#include "robots/mbbr/world.hpp"
+
+namespace equipoise {
+
+struct MbbrFirmware {
+  using Robot = Mbbr;
+  using Config = MbbrConfig;
+  using Loaded = equipoise::Loaded<MbbrConfig>;
+  using World = MbbrWorld;
+  static constexpr const char* kName = "mbbr";
+  static constexpr const char* kDefaultEstimator = "ekf";
+  static constexpr const char* kDefaultController = "scheduled";
+  static constexpr const char* kSpeedRmseKey = "ball_speed_rmse_m_s";
+  static constexpr const char* kSpeedLabel = "ball speed RMSE";
+  static constexpr const char* kSpeedUnit = "cm/s";
+  static constexpr double kSpeedScale = 100.0;
+
+  static Loaded load(const std::string& path, const Overrides& overrides) {
+    return load_mbbr(path, overrides);
+  }
+  static Loaded parse(const std::string& text, const std::string& origin) { return parse_mbbr(text, origin); }
+  static std::vector<std::string> estimators() {
+    return {kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end()};
+  }
+  static std::vector<std::string> controllers() { return {"thesis", "scheduled"}; }
+  static double rolling_radius_m(const Config& c) { return c.robot.r; }
+
+  /// The configuration with the choices applied, as it flies.
+  static Config apply(const Config& configured, const Choice& choice) {
+    return with_choice(configured, choice, kMbbrEstimatorNames, MbbrEstimatorId::kEkf13Published,
+                       MbbrEstimatorId::kKfAttitude);
+  }
+
+  /// f(pipeline); the controller decides its type.
+  template <class F>
+  static auto with_pipeline(const Config& config, const std::string& controller, F&& f) {
+    if (controller == "thesis") {
+      MbbrThesisPipeline pipeline(config.thesis_pipeline());
+      return f(pipeline);
+    }
+    MbbrScheduledPipeline pipeline(config.scheduled_pipeline());
+    return f(pipeline);
+  }
+
+  /// `config` as it flies; `level` of fidelity.
+  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
+    MbbrWorldParams params = config.world[level];
+    params.common.seed = seed;
+    return World(config.robot, config.motor, config.calibration, params);
+  }
+};
+
+}  // namespace equipoise

@@ -1,0 +1,62 @@
+// The eduMIP as sim, run and replay build it: names, defaults, configuration, pipeline, world. One line of
+// robots/robots.hpp names it. Start-up only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "robots/choice.hpp"
+#include "robots/mip/config.hpp"
+#include "robots/mip/world.hpp"
+
+namespace equipoise {
+
+struct MipFirmware {
+  using Robot = Mip;
+  using Config = MipConfig;
+  using Loaded = equipoise::Loaded<MipConfig>;
+  using World = MipWorld;
+  static constexpr const char* kName = "mip";
+  static constexpr const char* kDefaultEstimator = "ekf";
+  static constexpr const char* kDefaultController = "slc";
+  static constexpr const char* kSpeedRmseKey = "wheel_speed_rmse_rad_s";
+  static constexpr const char* kSpeedLabel = "wheel speed RMSE";
+  static constexpr const char* kSpeedUnit = "rad/s";
+  static constexpr double kSpeedScale = 1.0;
+
+  static Loaded load(const std::string& path, const Overrides& overrides) {
+    return load_mip(path, overrides);
+  }
+  static Loaded parse(const std::string& text, const std::string& origin) { return parse_mip(text, origin); }
+  static std::vector<std::string> estimators() {
+    return {kMipEstimatorNames.begin(), kMipEstimatorNames.end()};
+  }
+  static std::vector<std::string> controllers() { return {"slc", "lqr"}; }
+  static double rolling_radius_m(const Config& c) { return c.robot.r; }
+
+  /// The configuration with the choices applied, as it flies.
+  static Config apply(const Config& configured, const Choice& choice) {
+    return with_choice(configured, choice, kMipEstimatorNames, MipEstimatorId::kEkfPublished,
+                       MipEstimatorId::kAttitude);
+  }
+
+  /// f(pipeline); the controller decides its type.
+  template <class F>
+  static auto with_pipeline(const Config& config, const std::string& controller, F&& f) {
+    if (controller == "slc") {
+      MipSlcPipeline pipeline(config.slc_pipeline());
+      return f(pipeline);
+    }
+    MipLqrPipeline pipeline(config.lqr_pipeline());
+    return f(pipeline);
+  }
+
+  /// `config` as it flies; `level` of fidelity.
+  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
+    MipWorldParams params = config.world[level];
+    params.common.seed = seed;
+    return World(config.robot, config.motor, config.calibration, params);
+  }
+};
+
+}  // namespace equipoise
