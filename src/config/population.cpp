@@ -98,7 +98,7 @@ std::vector<Drawn> draw_robot(const std::string& path, const std::vector<std::st
   if (ranges == nullptr) throw ConfigError(path + ": population: missing; robots are drawn from it");
   const toml::table* target = document.root()["world"][world].as_table();
   if (target == nullptr) throw ConfigError(path + ": world." + world + ": missing");
-  draw(*ranges, *target, "", number, &drawn);
+  draw(*ranges, *target, "", robot, &drawn);
   return drawn;
 }
 
