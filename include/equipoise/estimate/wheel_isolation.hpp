@@ -20,7 +20,7 @@ template <class Filter, int Wheels>
 class WheelIsolation {
  public:
   using Sample = Measurement<Wheels>;
-  static constexpr int kArmingTicks = 200;  // after arming the bank runs anyway
+  static constexpr int kArmingTicks = 100;  // after arming the bank runs anyway
 
   explicit WheelIsolation(const Filter& filter) : bank_(filled(filter, std::make_index_sequence<Wheels>())) {}
 
@@ -81,7 +81,7 @@ class WheelIsolation {
   static constexpr int kFirstTick = 5;
   static constexpr int kTrialTicks = 80;
   static constexpr int kQuietTicks = 100;
-  static constexpr int kHits = 2;  // ticks in a row
+  static constexpr int kHits = 3;  // ticks in a row
   static constexpr int kStillTicks = 6;
   static constexpr double kMean = 0.2;  // of the squared innovations: five ticks
   static constexpr double kSlipMean = 0.15;
@@ -89,7 +89,7 @@ class WheelIsolation {
   static constexpr double kSlip_rad_s = 0.3;  // pushes do not enter it
   static constexpr double kSurprised = 2.0;   // mean of the filter with all wheels
   static constexpr double kSuspicious = 1.0;
-  static constexpr double kExplains = 0.35;  // of the surprise is left without the wheel
+  static constexpr double kExplains = 0.25;  // of the surprise is left without the wheel
   static constexpr double kExplainsStill = 0.8;
   static constexpr double kTurning_rad_s = 1.5;
 

@@ -81,7 +81,9 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
   if (runs(Id::kEkf)) {
     const MbbrEstimate& before = estimates_[index(Id::kEkf)];
     isolation_.step(ekf_, u, z, [&](const Vec3& wheel_rates) {
-      return Mbbr::slip_rad_s(wheel_rates, z.gyro_B_rad_s.z(), kinematics_, before);
+      Mbbr::Sample fresh = z;
+      fresh.wheel_rate_rad_s = wheel_rates;
+      return Mbbr::slip_rad_s(fresh, kinematics_, before);
     });
     estimates_[index(Id::kEkf)] = ekf_.estimate();
   }

@@ -93,13 +93,9 @@ struct Mbbr {
   /// The ball does not spin about the vertical: (R^T omega)_z - Omega_z must be what the encoders say.
   static double slip_rad_s(const Sample& z, const MbbrKinematics& kinematics,
                            const MbbrEstimate& x) noexcept {
-    return slip_rad_s(z.wheel_rate_rad_s, z.gyro_B_rad_s.z(), kinematics, x);
-  }
-  static double slip_rad_s(const Vec3& wheel_rate_rad_s, double gyro_z_rad_s,
-                           const MbbrKinematics& kinematics, const MbbrEstimate& x) noexcept {
     const double vertical = x.phi_dot_star.x() * std::sin(x.theta_xy.y()) * std::cos(x.theta_xy.x()) -
                             x.phi_dot_star.y() * std::sin(x.theta_xy.x());
-    return kinematics.ball_from_wheels(wheel_rate_rad_s).z() - (vertical - gyro_z_rad_s);
+    return kinematics.ball_from_wheels(z.wheel_rate_rad_s).z() - (vertical - z.gyro_B_rad_s.z());
   }
 };
 
