@@ -1,9 +1,9 @@
 // Which encoder lies? A bank of filters, each without one wheel, beside the one that uses all; the one that
 // leaves out the liar explains the rest. In: input, sample, spin of the wheels against the gyro -> out: which
 // wheel, and whether it stands still; the filter goes on without it. The bank runs right after arming and
-// under suspicion only. Its limits were chosen on 30 robots of the population, with pushes, stuck and reversed
-// wheels. Filter: predict(u), update(z), row_nis(), wheel_rate_rad_s(), Model::kWheel. RT-safe: bounded, no
-// allocation.
+// under suspicion only. Its limits were chosen on 30 robots of the population, with pushes, stuck and
+// reversed wheels. Filter: predict(u), update(z), row_nis(), wheel_rate_rad_s(), Model::kWheel. RT-safe:
+// bounded, no allocation.
 #pragma once
 
 #include <algorithm>
