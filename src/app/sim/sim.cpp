@@ -6,6 +6,7 @@
 
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
+#include "app/cli/reasons.hpp"
 #include "app/log/log_name.hpp"
 #include "app/sim/simulate.hpp"
 #include "config/population.hpp"
