@@ -48,7 +48,7 @@ TYPED_TEST(EncoderCheckOnRobot, FindsAReversedEncoderAndNamesTheWheel) {
 TYPED_TEST(EncoderCheckOnRobot, FindsAStuckEncoderAndNamesTheWheel) {
   for (std::size_t wheel = 0; wheel < this->kWheels; ++wheel) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      const TrialEnd end = run_trial<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 2.0,
+      const TrialEnd end = run_trial<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 10.0,
                                                 [&](RawSample& raw) { raw.encoder_counts[wheel] = 17.0; });
       expect_named<TypeParam>(end, kEncoderStuck, wheel, seed);
     }

@@ -225,9 +225,11 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
     {kEncoderSign, [] { return reversed_encoder(0); }},
     {kEstimatorUnhealthy,
      [] {
-       return with_samples([](RawSample& raw, std::int64_t tick) {
-         if (tick > 100) raw.gyro_counts[0] += 16.4 * 60.0 * (tick / 4 % 2 == 0 ? 1.0 : -1.0);
-       });
+       return with_samples(
+           [](RawSample& raw, std::int64_t tick) {
+             if (tick > 100) raw.gyro_counts[0] += 16.4 * 60.0 * (tick / 4 % 2 == 0 ? 1.0 : -1.0);
+           },
+           {"safety.max_innovation=4.0", "safety.max_innovation_s=0.15"});
      }},
     {kCommandStale, silent_remote},
     {kRealtimeMissing, no_realtime},
