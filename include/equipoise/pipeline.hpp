@@ -4,8 +4,10 @@
 #pragma once
 
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/actuate/degraded.hpp"
 #include "equipoise/actuate/safety_inputs.hpp"
 #include "equipoise/control/friction.hpp"
+#include "equipoise/estimate/health.hpp"
 #include "equipoise/robot_contract.hpp"
 #include "equipoise/sense/senses.hpp"
 
@@ -21,8 +23,9 @@ struct TickResult {
   MotorCommand motors{};
   bool saturated = false;
   ArmState arm_state = ArmState::kDisarmed;
-  std::uint32_t reasons = 0;  // SafetyReason bits
-  std::uint32_t inhibit = 0;  // those of them that the runtime asked for
+  std::uint32_t reasons = 0;   // SafetyReason bits
+  std::uint32_t inhibit = 0;   // those of them that the runtime asked for
+  std::uint32_t degraded = 0;  // DegradedBit: what the robot does without
 };
 
 template <class Robot, class Estimators, class Reference, class Feedback>
@@ -51,7 +54,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         estimators_(p.estimators),
         reference_(p.reference),
         feedback_(p.feedback),
-        encoder_check_(p.safety.encoder_check_drive),
+        encoder_check_(estimators_.isolates() ? 0.0 : p.safety.encoder_check_drive),
         bridge_(p.motor),
         safety_(p.safety) {}
 
@@ -60,9 +63,11 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     Result t;
     t.z = senses_.update(raw);                                         // counts -> SI; what of it is news
     t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
-    t.ref = follow(safety_.timely(asked), t.x_hat);                    // [T] 6.2.1
-    t.u_lin = feedback_.update(t.ref);                                 // [T] (6.10)
-    t.u_lin += encoder_stimulus(t.z);                                  // shakes each wheel right after arming
+    health_ = estimators_.health();
+    t.degraded = do_without(t.z);
+    t.ref = follow(limited(safety_.timely(asked), t.degraded), t.x_hat);  // [T] 6.2.1
+    t.u_lin = feedback_.update(t.ref);                                    // [T] (6.10)
+    t.u_lin += encoder_stimulus(t.z);  // shakes each wheel right after arming
     const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);
     t.u_friction = t.u_lin + friction;            // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
@@ -82,6 +87,19 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
                                        const typename Robot::Estimate& x_hat) noexcept {
     if (!safety_.armed()) reference_.reset(x_hat);
     return reference_.update(command, x_hat);
+  }
+
+  /// The model's rate stands in for an encoder that is not to be had.
+  std::uint32_t do_without(typename Robot::Sample& z) const noexcept {
+    if (!safety_.armed()) return 0;
+    std::uint32_t degraded = health_.lost * kWithoutWheelOne;
+    if (!z.imu_ok) degraded |= kWithoutImu;
+    if (!z.encoders_ok) degraded |= kWithoutEncoders;
+    for (int i = 0; i < Robot::kWheels && health_.predicts_wheels; ++i) {
+      const bool lost = !z.encoders_ok || (health_.lost >> i & 1U) != 0;
+      if (lost) z.wheel_rate_rad_s(i) = health_.wheel_rate_rad_s(i);
+    }
+    return degraded;
   }
 
   Input encoder_stimulus(const typename Robot::Sample& z) noexcept {
@@ -126,6 +144,10 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   SafetyInputs checks(const Result& t, const Command& asked, std::uint32_t inhibit) const noexcept {
     SafetyInputs in = safety_inputs(t.z, view(t.x_hat, p_.robot), encoder_check_, asked);
+    if (health_.while_arming)
+      (health_.stood_still ? in.encoders_stuck : in.encoders_reversed) |= health_.lost;
+    in.encoders_in_check = in.encoders_in_check || health_.checking;
+    in.tilt_sigma_rad = health_.tilt_sigma_rad;
     in.slip_rad_s = slip_rad_s<Robot>(t, kinematics_, 0);
     in.saturated = t.saturated;
     in.all_finite = in.all_finite && t.u_friction.allFinite();
@@ -170,6 +192,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   EncoderCheck<Robot::kWheels> encoder_check_;
   Bridge bridge_;
   Safety safety_;
+  EstimatorHealth<Robot::kWheels> health_;
   Wheels duty_previous_ = Wheels::Zero();
   Input u_previous_ = Input::Zero();
 };

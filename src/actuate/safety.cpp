@@ -76,7 +76,7 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   std::uint32_t reasons = 0;
   if (!(tilt <= (armed() ? p_.max_tilt_rad : p_.max_arm_tilt_rad))) reasons |= kTilt;
   if (!armed() && !(in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s)) reasons |= kGyroMoving;
-  if (unhealthy_) reasons |= kEstimatorUnhealthy;
+  if (unhealthy_ || !(in.tilt_sigma_rad <= p_.max_tilt_sigma_rad)) reasons |= kEstimatorUnhealthy;
   if (std::abs(slip_) > p_.max_slip_rad_s) reasons |= kWheelSlip;
   if (fast_ >= kFastTicks || falling_ >= kFallingTicks) reasons |= kPickedUp;
   return reasons;

@@ -83,6 +83,7 @@ SafetyParams read_safety(Section s) {
   p.max_innovation_published = s.number("max_innovation_published", 1.0, 1000.0);
   p.max_innovation_s = s.number("max_innovation_s", 0.0, 10.0);
   p.encoder_check_drive = s.number("encoder_check_drive", 0.0, 0.6);
+  p.max_tilt_sigma_rad = s.number("max_tilt_sigma_rad", 0.01, 1.0);
   p.max_slip_rad_s = s.number("max_slip_rad_s", 0.1, 1000.0);
   p.max_wheel_rate_rad_s = s.number("max_wheel_rate_rad_s", 1.0, 10000.0);
   p.max_saturated_s = s.number("max_saturated_s", 0.01, 60.0);

@@ -88,8 +88,22 @@ std::uint32_t with_samples(std::function<void(RawSample&, std::int64_t)> spoil,
   return mbbr(scene);
 }
 
+/// Driven off right after arming: a wheel that has to turn shows at once what its encoder is worth.
+std::uint32_t driven_off(std::function<void(RawSample&, std::int64_t)> spoil) {
+  Scene scene;
+  scene.spoil = std::move(spoil);
+  scene.commands = [](std::int64_t tick, std::int64_t) {
+    Command command;
+    command.arm = tick >= kArmTick;
+    command.velocity_W_m_s = Vec2(0.2, 0.1);
+    command.yaw_rate_rad_s = 2.0;
+    return command;
+  };
+  return mbbr(scene);
+}
+
 std::uint32_t reversed_encoder(std::size_t wheel) {
-  return with_samples([wheel](RawSample& raw, std::int64_t) { raw.encoder_counts[wheel] *= -1.0; });
+  return driven_off([wheel](RawSample& raw, std::int64_t) { raw.encoder_counts[wheel] *= -1.0; });
 }
 
 /// Upright in a fist: told to drive, but the wheels only creep.
@@ -225,9 +239,11 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
     {kEncoderSign, [] { return reversed_encoder(0); }},
     {kEstimatorUnhealthy,
      [] {
-       return with_samples([](RawSample& raw, std::int64_t tick) {
-         if (tick > 100) raw.gyro_counts[0] += 16.4 * 60.0 * (tick / 4 % 2 == 0 ? 1.0 : -1.0);
-       });
+       return with_samples(
+           [](RawSample& raw, std::int64_t tick) {
+             if (tick > 100) raw.gyro_counts[0] += 16.4 * 60.0 * (tick / 4 % 2 == 0 ? 1.0 : -1.0);
+           },
+           {"safety.max_innovation=4.0", "safety.max_innovation_s=0.15"});
      }},
     {kCommandStale, silent_remote},
     {kRealtimeMissing, no_realtime},
@@ -255,7 +271,7 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
     {kWriteFailed, [] { return after(app::FaultKind::kWriteError); }},
     {kLogFailed, full_disk},
     {kEncoderStuck,
-     [] { return with_samples([](RawSample& raw, std::int64_t) { raw.encoder_counts[1] = 17.0; }); }},
+     [] { return driven_off([](RawSample& raw, std::int64_t) { raw.encoder_counts[1] = 17.0; }); }},
     {kWheelOne, [] { return reversed_encoder(0); }},
     {kWheelTwo, [] { return reversed_encoder(1); }},
     {kWheelThree, [] { return reversed_encoder(2); }},

@@ -25,7 +25,8 @@ inline std::string config_file<app::MipFirmware>() {
 struct TrialEnd {
   ArmState arm_state = ArmState::kDisarmed;
   std::uint32_t reasons = 0;
-  double ended_at_s = 0.0;  // after arming; the motors' last tick
+  std::uint32_t degraded = 0;  // DegradedBit, of any tick
+  double ended_at_s = 0.0;     // after arming; the motors' last tick
 };
 
 /// Half a second at rest, then armed for `seconds` or until the motors go off. `interfere(RawSample&)`: every
@@ -49,7 +50,8 @@ TrialEnd run_trial(const app::Choice& choice, std::uint64_t seed, double seconds
     };
     const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&,
                              const auto& t) {
-      end = {t.arm_state, t.reasons, static_cast<double>(tick - kRestTicks) * kTickS};
+      end = {t.arm_state, t.reasons, end.degraded | t.degraded,
+             static_cast<double>(tick - kRestTicks) * kTickS};
       done = tick > kRestTicks && !t.motors.enable;
     };
     SteppedIo io(hardware, kRestTicks + static_cast<std::int64_t>(seconds * kTickHz), interfere);

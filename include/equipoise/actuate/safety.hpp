@@ -42,6 +42,7 @@ struct SafetyParams {
   double max_innovation_published = 20.0;  // the same for [T]'s own filter, which trusts itself more
   double max_innovation_s = 0.05;          // above it for longer
   double encoder_check_drive = 0.3;  // shakes each wheel right after arming; 0: encoders are not checked
+  double max_tilt_sigma_rad = 0.1;   // the tilt is not known any more
   double max_slip_rad_s = 8.0;  // encoders against gyro, where the robot tells; mean over about ten ticks
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
   double max_saturated_s = 0.5;        // without a break
@@ -59,8 +60,9 @@ struct SafetyInputs {
   bool attitude_ok = false;
   bool bridge_fault = false;  // a bridge complains
   double battery_V = 0.0;
-  double accel_m_s2 = 0.0;  // magnitude of gravity minus acceleration
-  double slip_rad_s = 0.0;  // 0 where the robot cannot tell
+  double accel_m_s2 = 0.0;      // magnitude of gravity minus acceleration
+  double tilt_sigma_rad = 0.0;  // the estimator's own; 0 where it does not tell
+  double slip_rad_s = 0.0;      // 0 where the robot cannot tell
   std::array<double, kMaxMotors> wheel_rate_rad_s{};
   bool saturated = false;
   bool all_finite = false;  // of everything the tick computed

@@ -94,7 +94,7 @@ void record_tick(std::int64_t tick, std::int64_t now_ns, const RawSample& raw, c
     record->compared |= 1U << i;
   }
   record->motors = kWheels;
-  record->degraded = 0;  // no robot does without anything yet
+  record->degraded = t.degraded;
   for (int i = 0; i < kInputs; ++i) {
     record->u_lin[static_cast<std::size_t>(i)] = t.u_lin(i);
     record->u_friction[static_cast<std::size_t>(i)] = t.u_friction(i);

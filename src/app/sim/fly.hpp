@@ -36,6 +36,7 @@ SimSummary fly(World& world, Pipeline& pipeline, double rolling_radius_m, const 
   std::atomic<bool> done{false};
   const auto end_tick = static_cast<std::int64_t>(std::llround(options.duration_s * kTickHz));
   runtime::TickRecord record{};
+  std::uint32_t degraded = 0;
   const bool records = static_cast<bool>(observe);
 
   const auto commands = [&](std::int64_t, std::int64_t) {
@@ -50,6 +51,7 @@ SimSummary fly(World& world, Pipeline& pipeline, double rolling_radius_m, const 
     const StateView seen = view(t.x_hat, robot);
     meter.motors(t.motors, t.saturated);
     meter.heading(seen, truth_view);
+    degraded |= t.degraded;
     if (RunMeter::settled(time_s)) {
       const StateErrors e = errors(t.x_hat, truth, robot);
       meter.controlling(e);
@@ -77,6 +79,7 @@ SimSummary fly(World& world, Pipeline& pipeline, double rolling_radius_m, const 
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   SimSummary summary = meter.summary(judge.verdict(stop.load(), false), end.ticks, wall_s);
+  summary.degraded = degraded;
   for (std::size_t i = 0; i < Estimators::kCount; ++i) {
     if (estimators.runs(static_cast<typename Estimators::Id>(i))) {
       summary.estimators[Estimators::kNames[i]] = meter.compared_errors(i);

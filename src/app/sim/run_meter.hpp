@@ -35,6 +35,7 @@ struct SimSummary {
   double yaw_rate_mean_hz = kUncounted;
   double duty_max = 0.0;
   double saturated_fraction = 0.0;
+  std::uint32_t degraded = 0;  // DegradedBit: what it did without at any time
   std::int64_t ticks = 0;
   double real_time_factor = 0.0;
   std::map<std::string, EstimatorErrors> estimators;

@@ -6,6 +6,7 @@
 
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
+#include "app/cli/reasons.hpp"
 #include "app/log/log_name.hpp"
 #include "app/sim/simulate.hpp"
 #include "config/population.hpp"
@@ -55,7 +56,7 @@ nlohmann::json to_json(const Arguments& a, const SimSummary& s, const std::strin
                      {"ticks", s.ticks},
                      {"real_time_factor", s.real_time_factor},
                      {"interrupted", s.verdict.ended == Ended::kInterrupted},
-                     {"degraded", nlohmann::json::array()},
+                     {"degraded", degraded_names(s.degraded)},
                      {"log", a.log},
                      {"estimators", estimators},
                      {"config_sha256", config_sha256},

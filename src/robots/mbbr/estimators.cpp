@@ -18,6 +18,7 @@ MbbrEstimators::MbbrEstimators(const Params& params)
     : params_(params),
       kinematics_(params.robot),
       ekf_(params.robot, params.ekf),
+      isolation_(ekf_),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(MbbrLinearModel(params.robot, params.kf_yaw_transport), params.kf) {}
@@ -27,6 +28,7 @@ void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
 
   ekf_.start(tilt, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
+  isolation_.reset();
 
   Vec<13> x13 = Vec<13>::Zero();
   x13.head<2>() = tilt;
@@ -55,6 +57,15 @@ void MbbrEstimators::integrate(Id id, double heading_rate) noexcept {
   x.theta_z += kTickS * heading_rate;
 }
 
+EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
+  EstimatorHealth<Mbbr::kWheels> h;
+  if (params_.active != Id::kEkf) return h;
+  report(isolation_, &h);
+  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
+  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
+  return h;
+}
+
 const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept {
   if (held) {
     start(z);
@@ -68,8 +79,12 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
   const std::array<bool, 8> use{i, i, i, e, e, e, i, i};
 
   if (runs(Id::kEkf)) {
-    ekf_.predict(u);
-    ekf_.update(z);
+    const MbbrEstimate& before = estimates_[index(Id::kEkf)];
+    isolation_.step(ekf_, u, z, [&](const Vec3& wheel_rates) {
+      Mbbr::Sample fresh = z;
+      fresh.wheel_rate_rad_s = wheel_rates;
+      return Mbbr::slip_rad_s(fresh, kinematics_, before);
+    });
     estimates_[index(Id::kEkf)] = ekf_.estimate();
   }
 

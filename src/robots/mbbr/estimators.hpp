@@ -7,9 +7,11 @@
 
 #include <array>
 
+#include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "equipoise/estimate/wheel_isolation.hpp"
 #include "robots/mbbr/ekf.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/mbbr.hpp"
@@ -52,6 +54,10 @@ class MbbrEstimators {
   const MbbrEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
   /// The default filter: rows, variances, predicted wheel rates.
   const MbbrEkf& ekf() const noexcept { return ekf_; }
+  /// Of the active estimator; only the default filter tells.
+  EstimatorHealth<Mbbr::kWheels> health() const noexcept;
+  /// It finds a lying encoder by itself.
+  bool isolates() const noexcept { return params_.active == Id::kEkf; }
   bool needs_attitude() const noexcept { return params_.active == Id::kKfAttitude; }
 
  private:
@@ -62,6 +68,7 @@ class MbbrEstimators {
   Params params_;
   MbbrKinematics kinematics_;
   MbbrEkf ekf_;
+  WheelIsolation<MbbrEkf, Mbbr::kWheels> isolation_;
   KalmanFilter<MbbrPublishedModel> ekf13_published_;
   KalmanFilter<MbbrModel13> ekf13_;
   KalmanFilter<MbbrLinearModel> kf_;

@@ -27,7 +27,7 @@ Vec3 MbbrScheduledFeedback::update(const MbbrReference& ref) noexcept {
                         gain(MbbrGains::kUBefore, d_u_before_);
   const Vec2 feedforward =
       times(g.speed, -g.speed_turn * ref.yaw_rate, ref.phi_dot_star) + g.drive * ref.phi_ddot_star;
-  d_u_before_ = feedback;
+  d_u_before_ = feedback.allFinite() ? feedback : Vec2(Vec2::Zero());  // one NaN is not for ever
   const Vec2 u = feedback + feedforward;
   const double yaw_feedforward = p_.yaw_feedforward ? g.yaw_feedforward * ref.yaw_rate : 0.0;
   const double u_z = yaw_feedforward - g.yaw_angle * ref.d_theta_z - g.yaw_rate * ref.d_yaw_rate;

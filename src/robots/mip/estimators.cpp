@@ -8,6 +8,7 @@ MipEstimators::MipEstimators(const Params& params)
       complementary_kf_(MipInclinometerModel{}, params.complementary_kf),
       planar_kf_(MipPlanarModel(params.robot), params.planar_kf),
       ekf_(params.robot, params.ekf),
+      isolation_(ekf_),
       ekf_published_(MipPublishedModel{}, params.ekf_published) {}
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {
@@ -20,6 +21,7 @@ void MipEstimators::start(const Mip::Sample& z) noexcept {
   complementary_kf_.reset({lean, 0.0});
   planar_kf_.reset({lean, phi, 0.0, 0.0});
   ekf_.start(lean, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
+  isolation_.reset();
   Vec<6> x6 = Vec<6>::Zero();
   x6.head<3>() << lean, phi, heading_;
   ekf_published_.reset(x6);
@@ -89,8 +91,9 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
 }
 
 void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
-  ekf_.predict(u);
-  ekf_.update(z);
+  // Without slip the wheels turn the body as the gyro says.
+  isolation_.step(ekf_, u, z,
+                  [&](const Vec2& wheel_rates) { return kinematics_.psi(wheel_rates) - z.gyro_B_rad_s.z(); });
   MipEstimate& x = estimates_[index(Id::kEkf)];
   const Vec2 position = x.position_W_m;
   x = ekf_.estimate();
@@ -124,6 +127,15 @@ void MipEstimators::attitude(const Mip::Sample& z) noexcept {
     x.theta += kTickS * z.gyro_B_rad_s.x();
   }
   from_wheels_and_gyro(Id::kAttitude, z);
+}
+
+EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
+  EstimatorHealth<Mip::kWheels> h;
+  if (params_.active != Id::kEkf) return h;
+  report(isolation_, &h);
+  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
+  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
+  return h;
 }
 
 const MipEstimate& MipEstimators::update(const Mip::Sample& z, const Vec2& u, bool held) noexcept {

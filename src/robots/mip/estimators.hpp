@@ -7,9 +7,11 @@
 
 #include <array>
 
+#include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "equipoise/estimate/wheel_isolation.hpp"
 #include "robots/mip/ekf.hpp"
 #include "robots/mip/mip.hpp"
 #include "robots/mip/models.hpp"
@@ -61,6 +63,10 @@ class MipEstimators {
   const MipEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
   /// The default filter: rows, variances, predicted wheel rates.
   const MipEkf& ekf() const noexcept { return ekf_; }
+  /// Of the active estimator; only the default filter tells.
+  EstimatorHealth<Mip::kWheels> health() const noexcept;
+  /// It finds a lying encoder by itself.
+  bool isolates() const noexcept { return params_.active == Id::kEkf; }
 
  private:
   static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
@@ -79,6 +85,7 @@ class MipEstimators {
   KalmanFilter<MipInclinometerModel> complementary_kf_;
   KalmanFilter<MipPlanarModel> planar_kf_;
   MipEkf ekf_;
+  WheelIsolation<MipEkf, Mip::kWheels> isolation_;
   KalmanFilter<MipPublishedModel> ekf_published_;
   RestTilt rest_tilt_;
   RestBias rest_bias_;

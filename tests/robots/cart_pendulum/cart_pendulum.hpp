@@ -6,6 +6,7 @@
 
 #include <array>
 
+#include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
 #include "equipoise/pipeline.hpp"
 
@@ -84,6 +85,10 @@ class CartPendulumEstimators {
   const CartPendulumEstimate& estimate(Id id) const noexcept {
     return estimates_[static_cast<std::size_t>(id)];
   }
+
+  /// A complementary filter has no opinion of its encoders.
+  bool isolates() const noexcept { return false; }
+  EstimatorHealth<CartPendulum::kWheels> health() const noexcept { return {}; }
 
   const CartPendulumEstimate& update(const CartPendulum::Sample& z, const Vec<1>&, bool held) noexcept {
     CartPendulumEstimate& x = of(Id::kComplementary);

@@ -1,0 +1,60 @@
+// What a robot does without while it runs on: one bit, one stable name and one speed limit per mode, for
+// telemetry, CLI and the setpoint. In: bits -> out: names, a command within the limits. RT-safe.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+enum DegradedBit : std::uint32_t {
+  kWithoutImu = 1u << 0,       // the model bridges a gap
+  kWithoutEncoders = 1u << 1,  // likewise
+  kEstimatorInDoubt = 1u << 2,
+  kWithoutWheelOne = 1u << 3,  // its encoder lies and is not used
+  kWithoutWheelTwo = 1u << 4,
+  kWithoutWheelThree = 1u << 5,
+  kWithoutWheelFour = 1u << 6,
+};
+
+struct DegradedMode {
+  const char* name;
+  double max_speed_m_s;
+  double max_yaw_rate_rad_s;
+};
+
+/// A gap is over before a slower setpoint would be felt; who doubts his estimate stands; one encoder less
+/// leaves no second opinion on slip, so the robot goes no faster than it was tried.
+inline constexpr std::array<DegradedMode, 7> kDegradedModes{{
+    {"without_imu", 0.0, 0.0},
+    {"without_encoders", 0.0, 0.0},
+    {"estimator_in_doubt", 0.0, 0.0},
+    {"without_wheel_1", 0.1, 2.0 * kPi},
+    {"without_wheel_2", 0.1, 2.0 * kPi},
+    {"without_wheel_3", 0.1, 2.0 * kPi},
+    {"without_wheel_4", 0.1, 2.0 * kPi},
+}};
+
+/// Calls `with(mode)` for every bit that is set.
+template <class With>
+void for_each_degraded(std::uint32_t degraded, With&& with) {
+  for (std::size_t i = 0; i < kDegradedModes.size(); ++i) {
+    if ((degraded & (1u << i)) != 0) with(kDegradedModes[i]);
+  }
+}
+
+inline Command limited(const Command& command, std::uint32_t degraded) noexcept {
+  Command slow = command;
+  for_each_degraded(degraded, [&slow](const DegradedMode& mode) {
+    const double speed = slow.velocity_W_m_s.norm();
+    if (speed > mode.max_speed_m_s) slow.velocity_W_m_s *= mode.max_speed_m_s / speed;
+    slow.yaw_rate_rad_s = std::clamp(slow.yaw_rate_rad_s, -mode.max_yaw_rate_rad_s, mode.max_yaw_rate_rad_s);
+  });
+  return slow;
+}
+
+}  // namespace equipoise

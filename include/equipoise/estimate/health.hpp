@@ -1,0 +1,22 @@
+// What an estimator says of itself and of its sensors, for safety and for the stages behind it. Plain values,
+// RT-safe.
+#pragma once
+
+#include <cstdint>
+
+#include "equipoise/types.hpp"
+
+namespace equipoise {
+
+template <int Wheels>
+struct EstimatorHealth {
+  double tilt_sigma_rad = 0.0;   // 0: not known
+  std::uint32_t lost = 0;        // bit per wheel whose encoder is not used any more
+  bool stood_still = false;      // when it was found out
+  bool while_arming = false;     // found so early that the robot had better not run without it
+  bool checking = false;         // just armed: the encoders are on trial
+  bool predicts_wheels = false;  // `wheel_rate_rad_s` may stand in for an encoder
+  Vec<Wheels> wheel_rate_rad_s = Vec<Wheels>::Zero();
+};
+
+}  // namespace equipoise

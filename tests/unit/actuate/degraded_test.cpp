@@ -1,0 +1,40 @@
+// Degraded modes: names of their own, and a setpoint within their limits.
+#include "equipoise/actuate/degraded.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+namespace equipoise {
+namespace {
+
+TEST(Degraded, EveryBitHasANameOfItsOwn) {
+  std::set<std::string> names;
+  for_each_degraded(~0U, [&](const DegradedMode& mode) { names.insert(mode.name); });
+  EXPECT_EQ(names.size(), kDegradedModes.size());
+  EXPECT_EQ(kWithoutWheelFour, 1U << (kDegradedModes.size() - 1));
+}
+
+TEST(Degraded, SlowsTheCommandAndKeepsItsDirection) {
+  Command fast;
+  fast.velocity_W_m_s = Vec2(0.3, -0.4);
+  fast.yaw_rate_rad_s = -20.0;
+  const Command slow = limited(fast, kWithoutWheelTwo);
+  EXPECT_NEAR(slow.velocity_W_m_s.norm(), 0.1, 1e-12);
+  EXPECT_NEAR(slow.velocity_W_m_s.x() / slow.velocity_W_m_s.y(), -0.75, 1e-12);
+  EXPECT_NEAR(slow.yaw_rate_rad_s, -2.0 * kPi, 1e-12);
+}
+
+TEST(Degraded, LeavesASlowCommandAndASoundRobotAlone) {
+  Command command;
+  command.velocity_W_m_s = Vec2(0.05, 0.0);
+  command.yaw_rate_rad_s = 1.0;
+  EXPECT_EQ(limited(command, kWithoutWheelOne).velocity_W_m_s, command.velocity_W_m_s);
+  command.velocity_W_m_s = Vec2(0.5, 0.0);
+  EXPECT_EQ(limited(command, 0U).velocity_W_m_s, command.velocity_W_m_s);
+  EXPECT_EQ(limited(command, kWithoutImu).velocity_W_m_s, Vec2(0.0, 0.0));
+}
+
+}  // namespace
+}  // namespace equipoise
