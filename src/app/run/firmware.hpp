@@ -10,7 +10,7 @@
 #include "equipoise/config.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/runtime/telemetry.hpp"
-#include "robots/robots.hpp"
+#include "robots/robot_list.hpp"
 
 namespace equipoise::app {
 

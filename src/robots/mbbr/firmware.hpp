@@ -1,5 +1,5 @@
 // The MBBR as sim, run and replay build it: names, defaults, configuration, pipeline, world. One line of
-// robots/robots.hpp names it. Start-up only.
+// robots/robot_list.hpp names it. Start-up only.
 #pragma once
 
 #include <string>
