@@ -113,6 +113,7 @@ class SetText {
       if (value != nullptr) put(value, found, [&](auto& v) { table->insert_or_assign(name, std::move(v)); });
       return found;
     }
+    if (found == nullptr) fail("no such key in the configuration");
     for (std::size_t open = bracket; open < part.size();) {
       const std::size_t close = part.find(']', open);
       const std::string index = part.substr(open + 1, close == std::string::npos ? close : close - open - 1);
@@ -238,7 +239,8 @@ void check_board(const toml::table& root, const std::string& path, const BoardFa
   };
   const auto number = [&](const std::string& key, double theirs, const std::string& ours_key) {
     const toml::node* node = toml::at_path(root, ours_key).node();
-    const auto ours = node == nullptr ? std::nullopt : node->value<double>();
+    if (node == nullptr) return;
+    const auto ours = node->value<double>();
     if (ours && differs(theirs, *ours)) complain(key, shown(theirs), ours_key, *node, shown(*ours));
   };
   number("bridges.pwm_hz", board.pwm_hz, "motor.pwm_hz");
@@ -249,7 +251,8 @@ void check_board(const toml::table& root, const std::string& path, const BoardFa
     number("imu.R_BS" + index, board.R_BS[i], "calibration.R_BS" + index);
   }
   const toml::node* bridge = toml::at_path(root, "motor.bridge").node();
-  const auto ours = bridge == nullptr ? std::nullopt : bridge->value<std::string>();
+  if (bridge == nullptr) return;
+  const auto ours = bridge->value<std::string>();
   if (ours && *ours != board.bridge)
     complain("motor.bridge", "wired as " + board.bridge, "motor.bridge", *bridge, *ours);
 }

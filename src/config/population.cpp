@@ -106,10 +106,14 @@ std::vector<std::string> with_robot_drawn(const std::vector<Drawn>& drawn, const
                                           const std::vector<std::string>& overrides) {
   std::vector<std::string> all;
   for (const Drawn& d : drawn) {
-    std::string value;
-    for (const double v : d.values) value += (value.empty() ? "" : ", ") + exact(v);
-    if (d.values.size() > 1) value = "[" + value + "]";
-    all.push_back("world." + world + "." + d.key + "=" + value);
+    std::string setting = "world." + world + "." + d.key + "=";
+    const bool list = d.values.size() > 1;
+    for (std::size_t i = 0; i < d.values.size(); ++i) {
+      if (list) setting += i == 0 ? "[" : ", ";
+      setting += exact(d.values[i]);
+    }
+    if (list) setting += "]";
+    all.push_back(std::move(setting));
   }
   all.insert(all.end(), overrides.begin(), overrides.end());
   return all;

@@ -195,7 +195,7 @@ std::vector<double> Section::numbers(const std::string& key, std::size_t count, 
 
 Mat3 Section::rotation(const std::string& key) {
   const std::vector<double> rows = numbers(key, 9, -1.0, 1.0);
-  const Mat3 R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
+  Mat3 R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
   if (!((R * R.transpose() - Mat3::Identity()).norm() <= 1e-6) || R.determinant() < 0.0)
     fail(key, "is not a rotation matrix (rows, sensor axes to body axes)");
   return R;

@@ -74,8 +74,8 @@ class TimeBase {
   }
 
  private:
-  const Input& input(int earlier) const noexcept {
-    return inputs_[static_cast<std::size_t>(whole_ + earlier)];
+  const Input& input(std::size_t earlier) const noexcept {
+    return inputs_[static_cast<std::size_t>(whole_) + earlier];
   }
 
   double age_s_;

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <limits>
 
 #include "app/cli/commands.hpp"
 #include "app/design/steady_spin.hpp"
@@ -168,7 +169,9 @@ void print(const nlohmann::json& d) {
   std::printf("%s, %s on %s\n", d["robot"].get<std::string>().c_str(),
               d["controller"].get<std::string>().c_str(), d["estimator"].get<std::string>().c_str());
   std::printf("yaw, Hz  broken at       gain, dB        phase, deg  further delay, ms  disk\n");
-  const auto value = [](const nlohmann::json& v) { return v.is_null() ? HUGE_VAL : v.get<double>(); };
+  const auto value = [](const nlohmann::json& v) -> double {
+    return v.is_null() ? std::numeric_limits<double>::infinity() : v.get<double>();
+  };
   for (const nlohmann::json& row : d["rows"]) {
     for (const char* place : kBrokenAt) {
       const nlohmann::json& m = row["margins"][place];

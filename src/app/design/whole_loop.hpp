@@ -98,8 +98,9 @@ Loop whole_loop(const Plant& plant, const Controller& settled) {
     }
     return response;
   };
-  std::array<std::vector<Complex>, kSensors + 1> controller_responses;
-  for (std::size_t c = 0; c <= kSensors; ++c) controller_responses[c] = answer(c);
+  std::array<std::vector<Complex>, kSensors> controller_responses;
+  for (std::size_t c = 0; c < kSensors; ++c) controller_responses[c] = answer(c);
+  const std::vector<Complex> told_response = answer(kSensors);  // to the input the filter is told of
   const auto plant_responses = sensor_responses(plant, loop.omega_rad_s);
 
   for (std::size_t i = 0; i < points; ++i) {
@@ -111,7 +112,7 @@ Loop whole_loop(const Plant& plant, const Controller& settled) {
       all += through[c];
     }
     // The filter is told what was asked for.
-    const Complex rest = 1.0 - controller_responses[kSensors][i] * back;
+    const Complex rest = 1.0 - told_response[i] * back;
     loop.at_u.push_back(-all / rest);
     loop.at_gyro.push_back(-through[kGyro] / (rest - (all - through[kGyro])));
     loop.at_encoder.push_back(-through[kEncoder] / (rest - (all - through[kEncoder])));

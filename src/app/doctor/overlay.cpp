@@ -45,12 +45,13 @@ void examine_loaded(const Patient& patient, Findings* findings, int cells) {
   }
   const std::string ours = "equipoise-" + patient.board->overlay;
   bool found = false;
+  const std::string wanted = "pinctrl-cells " + std::to_string(cells);
   for (const auto& entry : fs::directory_iterator(chosen, error)) {
     const std::string name = entry.path().filename().string();
     if (name.rfind("equipoise", 0) != 0) continue;
     found = found || name.rfind(ours, 0) == 0;
     const std::string kind = first_line(entry.path().string());
-    if (cells != 0 && kind != "pinctrl-cells " + std::to_string(cells)) {
+    if (cells != 0 && kind != wanted) {
       findings->fail("device_tree.cells",
                      name + " is for \"" + kind + "\", this kernel has #pinctrl-cells = <" +
                          std::to_string(cells) + ">: wrong pads were switched, of the eMMC too",

@@ -51,7 +51,7 @@ std::set<std::string, std::less<>> channels_of(const std::string& path) {
   std::set<std::string, std::less<>> channels;
   LogReader reader = LogReader::open(path);
   for (LogEvent event; reader.next(&event);) {
-    if (channels.find(event.channel) == channels.end()) channels.emplace(event.channel);
+    channels.emplace(event.channel);
   }
   return channels;
 }

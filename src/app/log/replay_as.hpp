@@ -186,8 +186,8 @@ Replay replay_as(RunLog& log, const std::string& origin, const std::string& othe
   const auto loaded = Firmware::parse(info.config_toml, origin + " (its configuration)");
   const auto config = Firmware::apply(loaded.config, choice);
   const std::optional<std::size_t> index = index_of<Firmware>(other);
-  const Replay r = Firmware::with_pipeline(config, choice.controller,
-                                           [&](auto& pipeline) { return replay(log, pipeline, index); });
+  Replay r = Firmware::with_pipeline(config, choice.controller,
+                                     [&](auto& pipeline) { return replay(log, pipeline, index); });
   if (r.ticks == 0) throw InputError(origin + ": holds no whole tick");
   return r;
 }

@@ -36,8 +36,8 @@ runtime::Supervisor& RealtimeSession::begin(const std::atomic<bool>& log_failed)
                                    : "running without full real time",
                  realtime_->complaint().c_str());
   }
-  return supervisor_.emplace(
-      runtime::Watched{guard_ ? &guard_->page() : nullptr, standing_, &log_failed, false});
+  supervisor_.emplace(runtime::Watched{guard_ ? &guard_->page() : nullptr, standing_, &log_failed, false});
+  return *supervisor_;
 }
 
 void RealtimeSession::end() {

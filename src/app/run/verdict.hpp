@@ -22,7 +22,10 @@ struct Verdict {
   double duration_s = 0.0;
 
   bool fell() const noexcept { return ended == Ended::kFell || ended == Ended::kDisarmed; }
-  const char* name() const noexcept { return kEndedNames[static_cast<std::size_t>(ended)]; }
+  const char* name() const noexcept {
+    // cppcheck-suppress CastIntegerToAddressAtReturn
+    return kEndedNames[static_cast<std::size_t>(ended)];
+  }
   /// "Fell over at 3.20 s: tilt."
   std::string sentence() const;
   /// Adds ended, reasons, fell, fell_at_s.
