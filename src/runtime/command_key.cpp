@@ -70,8 +70,8 @@ std::string private_text(const std::string& path) {
   return text;
 }
 
-// By value: the copy is wiped. cppcheck-suppress passedByValue
-void write_private(const std::string& path, std::string text) {
+/// Wipes the text.
+void write_private(const std::string& path, std::string&& text) {
   const File file{open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
   if (file.fd < 0) throw std::runtime_error(path + ": " + std::strerror(errno));
   const bool written =

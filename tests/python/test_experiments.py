@@ -83,7 +83,7 @@ def estimators(**options) -> dict:
 
 @pytest.mark.parametrize("yaw_hz", [0.0, 0.75, -1.0])
 def test_kf_and_ekf_are_equal_in_ball_speed(yaw_hz):
-    """[T] Fig. 6.14, to the printed digit, a centimetre per second: our EKF's disturbance states make it better."""
+    """[T] Fig. 6.14, to the printed digit, 1 cm/s; our EKF's disturbance states make it better."""
     found = estimators(yaw_hz=yaw_hz)
     gap = found["ekf"]["ball_speed_rmse_m_s"] - found["kf_attitude"]["ball_speed_rmse_m_s"]
     assert abs(gap) < 0.005

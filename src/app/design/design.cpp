@@ -176,7 +176,7 @@ void print(const nlohmann::json& d) {
     for (const char* place : kBrokenAt) {
       const nlohmann::json& m = row["margins"][place];
       std::printf("%7.2f  %-9s  %+7.1f  %+7.1f    %10.1f  %17.1f  %5.2f%s\n", row["yaw_hz"].get<double>(),
-                  place, -std::abs(value(m["gain_down_dB"])), value(m["gain_up_dB"]), value(m["phase_deg"]),
+                  place, -std::fabs(value(m["gain_down_dB"])), value(m["gain_up_dB"]), value(m["phase_deg"]),
                   value(m["delay_ms"]), value(m["disk"]), row["stable"].get<bool>() ? "" : "  UNSTABLE");
     }
   }

@@ -52,10 +52,10 @@ void examine_loaded(const Patient& patient, Findings* findings, int cells) {
     found = found || name.rfind(ours, 0) == 0;
     const std::string kind = first_line(entry.path().string());
     if (cells != 0 && kind != wanted) {
-      findings->fail("device_tree.cells",
-                     name + " is for \"" + kind + "\", this kernel has #pinctrl-cells = <" +
-                         std::to_string(cells) + ">: wrong pads were switched, of the eMMC too",
-                     kChoose);
+      std::string what = name;
+      what.append(" is for \"").append(kind).append("\", this kernel has #pinctrl-cells = <");
+      what.append(std::to_string(cells)).append(">: wrong pads were switched, of the eMMC too");
+      findings->fail("device_tree.cells", what, kChoose);
     }
   }
   if (found) {
