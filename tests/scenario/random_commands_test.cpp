@@ -1,13 +1,14 @@
-// Any allowed command, suddenly: steps, reversals, full range, turning and driving at once. The governor
-// makes each feasible, so nobody falls. EQUIPOISE_COMMAND_SEQUENCES=1000 runs as many sequences per robot.
+// Any command, suddenly: steps, reversals, full range and beyond, turning and driving at once. The governor
+// makes each feasible, so nobody falls or is switched off. EQUIPOISE_COMMAND_SEQUENCES=1000: as many
+// sequences.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <limits>
 #include <random>
 
-#include "app/io/plant_backend.hpp"
-#include "app/run/firmware.hpp"
-#include "equipoise/runtime/loop.hpp"
+#include "app/cli/reasons.hpp"
+#include "support/trial.hpp"
 
 namespace equipoise {
 namespace {
@@ -51,49 +52,89 @@ class RandomPilot {
   double next_s_ = 1.5;
 };
 
+struct Trials {
+  std::string controller;
+  Range range;
+  std::string fidelity = "nominal";
+  std::vector<std::string> set{};
+  bool governed = true;
+};
+
+/// The commands go through as they are, at up to the configured acceleration.
+template <class Params>
+void bypass_governor(Params& reference) {
+  reference.max_jerk_m_s3 = std::numeric_limits<double>::infinity();
+  reference.feasible_acceleration_m_s2 = std::numeric_limits<double>::infinity();
+  reference.budget = DutyBudget{};
+}
+
 template <class Firmware>
-int falls(const typename Firmware::Config& configured, const std::string& controller, const Range& range) {
-  app::Choice choice;
-  choice.estimator = Firmware::kDefaultEstimator;
-  choice.controller = controller;
-  choice.fidelity = "nominal";
-  const auto config = Firmware::apply(configured, choice);
-  int fallen = 0;
+int lost(const Trials& t) {
+  const app::Choice choice{Firmware::kDefaultEstimator, t.controller, t.fidelity};
+  auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), t.set).config, choice);
+  if (!t.governed) bypass_governor(config.reference);
+  int count = 0;
   for (int seed = 1; seed <= sequences(); ++seed) {
-    auto world =
-        Firmware::world(config, app::fidelity_level(choice.fidelity), static_cast<std::uint64_t>(seed));
-    RandomPilot pilot(range, 1000U + static_cast<std::uint64_t>(seed));
+    auto world = Firmware::world(config, app::fidelity_level(t.fidelity), static_cast<std::uint64_t>(seed));
+    RandomPilot pilot(t.range, 1000U + static_cast<std::uint64_t>(seed));
     bool upright = true;
-    Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    std::uint32_t reasons = 0;
+    Firmware::with_pipeline(config, t.controller, [&](auto& pipeline) {
       app::PlantBackend backend(world);
       app::Hardware hardware(backend.io());
       std::atomic<bool> done{false};
       const auto commands = [&](std::int64_t, std::int64_t) { return pilot.at(world.time_s()); };
       const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&,
-                               const auto& t) {
-        upright = upright && (world.time_s() < 1.0 || t.arm_state == ArmState::kArmed);
-        if (!upright || tick >= static_cast<std::int64_t>(30.0 * kTickHz)) done = true;
+                               const auto& result) {
+        upright = world.time_s() < 1.0 || result.arm_state == ArmState::kArmed;
+        reasons = result.reasons;
+        done = !upright || tick >= static_cast<std::int64_t>(30.0 * kTickHz);
       };
       (void)runtime::run_loop(hardware, pipeline, commands, on_tick, done);
     });
-    if (!upright) {
-      ++fallen;
-      std::printf("sequence %d fell at %.2f s\n", seed, world.time_s());
-    }
+    if (upright) continue;
+    ++count;
+    std::printf("sequence %d: %s at %.2f s\n", seed, app::reasons_text(reasons).c_str(), world.time_s());
   }
-  return fallen;
+  return count;
 }
+
+const Range kMbbrRange{0.6, 6.0 * kPi};
+const Range kMipRange{0.8, 10.0};
+const std::vector<std::string> kNoGripModel{"world.full.disturbance.wheel_grip=0.0"};
 
 TEST(RandomCommands, NoneMakesTheMbbrFall) {
-  const auto config = load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", {}).config;
-  EXPECT_EQ(falls<app::MbbrFirmware>(config, "scheduled", {0.6, 6.0 * kPi}), 0);
+  EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange}), 0);
 }
 
-TEST(RandomCommands, NoneMakesTheMipFallUnderEitherController) {
-  const auto config = load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", {}).config;
-  for (const char* controller : {"slc", "lqr"}) {
-    EXPECT_EQ(falls<app::MipFirmware>(config, controller, {0.8, 10.0}), 0) << controller;
-  }
+TEST(RandomCommands, NoneMakesATypicalBuiltMbbrFall) {
+  EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange, "full", kNoGripModel}), 0);
+}
+
+TEST(RandomCommands, NoneMakesTheMipFallUnderSlc) {
+  EXPECT_EQ(lost<app::MipFirmware>({"slc", kMipRange}), 0);
+}
+
+TEST(RandomCommands, NoneMakesTheMipFallUnderLqr) {
+  EXPECT_EQ(lost<app::MipFirmware>({"lqr", kMipRange}), 0);
+}
+
+TEST(RandomCommands, NoneMakesATypicalBuiltMipFall) {
+  EXPECT_EQ(lost<app::MipFirmware>({"slc", kMipRange, "full", kNoGripModel}), 0);
+}
+
+/// What the governor is for: ten times the acceleration, asked for by somebody who does not know the robot.
+const std::vector<std::string> kImpatient{"reference.max_acceleration_m_s2=5.0"};
+
+TEST(RandomCommands, AnImpatientPilotIsHeldBackByTheGovernor) {
+  EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange, "nominal", kImpatient}), 0);
+  EXPECT_EQ(lost<app::MipFirmware>({"slc", kMipRange, "nominal", kImpatient}), 0);
+}
+
+TEST(RandomCommands, WithoutTheGovernorAnImpatientPilotMakesMostFall) {
+  EXPECT_GT(lost<app::MbbrFirmware>({"scheduled", kMbbrRange, "nominal", kImpatient, false}),
+            sequences() / 2);
+  EXPECT_GT(lost<app::MipFirmware>({"slc", kMipRange, "nominal", kImpatient, false}), sequences() / 2);
 }
 
 }  // namespace

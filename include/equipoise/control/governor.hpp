@@ -15,7 +15,7 @@ class SmoothVelocity {
  public:
   struct Limits {
     double acceleration;  // units/s^2
-    double jerk;          // units/s^3; infinite: a plain slew limit
+    double jerk;          // units/s^3; infinite: a plain slew limit, whose steps have no rate to feed forward
   };
 
   void reset() noexcept { *this = SmoothVelocity{}; }
@@ -32,7 +32,7 @@ class SmoothVelocity {
     const double change_length = change.norm();
     const Vec<N> before = acceleration_;
     acceleration_ += change_length > step ? Vec<N>(change * (step / change_length)) : change;
-    jerk_ = (acceleration_ - before) / kTickS;
+    if (std::isfinite(limits.jerk)) jerk_ = (acceleration_ - before) / kTickS;
     velocity_ += kTickS * acceleration_;
   }
 

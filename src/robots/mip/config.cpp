@@ -64,14 +64,17 @@ MipEstimatorParams read_estimators(Section s, const MipParameters& robot) {
   return p;
 }
 
-MipReferenceParams read_reference(Section s, double wheel_radius_m) {
+MipReferenceParams read_reference(Section s, const MipParameters& robot, double friction_share) {
   MipReferenceParams p;
   p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
   p.max_jerk_m_s3 = s.number("max_jerk_m_s3", 0.01, 1e9);
   p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
-  p.budget.share = s.number("duty_share", 0.05, 1.0);
+  const MipWheelBudget wheel{s.number("duty_share", 0.05, 1.0),
+                             s.number("max_wheel_rate_rad_s", 0.1, 1000.0)};
   p.max_phi_error_rad = s.number("max_phi_error_rad", 0.01, 1000.0);
-  p.wheel_radius_m = wheel_radius_m;
+  p.wheel_radius_m = robot.r;
+  p.feasible_acceleration_m_s2 = feasible_acceleration_m_s2(robot);
+  p.budget = mip_duty_budget(robot, wheel, friction_share);
   s.finish();
   return p;
 }
@@ -149,10 +152,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
   c.friction.gain = friction.number("compensation", 0.0, 1.5);
   friction.finish();
   c.estimators = read_estimators(root.table("estimator"), c.robot);
-  c.reference = read_reference(root.table("reference"), c.robot.r);
-
-  c.reference.feasible_acceleration_m_s2 = feasible_acceleration_m_s2(c.robot);
-  c.reference.budget = mip_duty_budget(c.robot, c.reference.budget.share, c.friction.gain);
+  c.reference = read_reference(root.table("reference"), c.robot, c.friction.gain);
 
   Section controller = root.table("controller");
   Section slc = controller.table("slc");

@@ -1,6 +1,7 @@
 #include "robots/mip/design.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "robots/mip/models.hpp"
@@ -88,11 +89,11 @@ double feasible_acceleration_m_s2(const MipParameters& p) {
   return recoverable(s.A, s.b, 0).limit / 3.0 * wheel_per_lean(s) * p.r;
 }
 
-DutyBudget mip_duty_budget(const MipParameters& p, double share, double friction_share) {
+DutyBudget mip_duty_budget(const MipParameters& p, const MipWheelBudget& wheel, double friction_share) {
   const double against_back_emf = (p.k2 + p.mu_v) / p.k1;
   DutyBudget b;
-  b.share = share;
   b.of_friction = friction_share * p.mu_c / p.k1;
+  b.share = std::min(wheel.duty_share, b.of_friction + against_back_emf * wheel.max_rate_rad_s);
   b.per_yaw_rate = p.yaw_to_wheel() * against_back_emf;
   b.per_speed = against_back_emf / p.r;
   return b;

@@ -103,8 +103,15 @@ std::optional<DesignProblem> design_problem(const MipParameters& p, const MipDes
 /// Acceleration whose lean takes a third of the tilt that the full torque can bring back.
 double feasible_acceleration_m_s2(const MipParameters& p);
 
-/// What steady motion takes of each wheel's duty; `friction_share`: of Coulomb friction that is compensated.
-DutyBudget mip_duty_budget(const MipParameters& p, double share, double friction_share);
+/// What a command may ask of a wheel in steady motion.
+struct MipWheelBudget {
+  double duty_share = 1.0;
+  double max_rate_rad_s = 1e9;
+};
+
+/// What steady motion takes of each wheel's duty, and may take: a wheel's rate is duty against its back-EMF.
+/// `friction_share`: of Coulomb friction that is compensated.
+DutyBudget mip_duty_budget(const MipParameters& p, const MipWheelBudget& wheel, double friction_share);
 
 MipSlcGains design_mip_slc(const MipParameters& p, const MipSlcDesign& d);
 MipGains design_mip(const MipParameters& p, const MipDesignParams& d);

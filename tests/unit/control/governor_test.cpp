@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "equipoise/control/allocate.hpp"
+#include "robots/mip/design.hpp"
 
 namespace equipoise {
 namespace {
@@ -36,11 +37,12 @@ TEST(SmoothVelocity, StaysWithinItsLimitsWhenTheTargetJumps) {
   }
 }
 
-TEST(SmoothVelocity, WithoutAJerkLimitIsAPlainSlew) {
+TEST(SmoothVelocity, WithoutAJerkLimitIsAPlainSlewWithNothingToFeedForward) {
   SmoothVelocity<1> v;
   const SmoothVelocity<1>::Limits limits{0.5, std::numeric_limits<double>::infinity()};
   v.update(Vec<1>(1.0), limits);
   EXPECT_DOUBLE_EQ(v.velocity()(0), 0.5 * kTickS);
+  EXPECT_EQ(v.jerk()(0), 0.0);
   for (int k = 0; k < 500; ++k) v.update(Vec<1>(1.0), limits);
   EXPECT_NEAR(v.velocity()(0), 1.0, 1e-12);
 }
@@ -56,6 +58,18 @@ TEST(DutyBudget, TurnsBeforeItTravels) {
   EXPECT_NEAR(b.allowed_speed(0.0), 1.0, 1e-12);
   EXPECT_NEAR(b.allowed_speed(-10.0), 0.6, 1e-12);
   EXPECT_EQ(b.allowed_speed(30.0), 0.0);
+}
+
+TEST(DutyBudget, OfTheMipKeepsItsWheelsBelowTheirRate) {
+  const MipParameters p;
+  const DutyBudget b = mip_duty_budget(p, {1.0, 18.0}, 0.8);
+  const double to_wheel = p.d / 2.0;  // m/s of a wheel per rad/s of yaw
+  for (const double yaw_rate : {0.0, 5.0, -10.0, 30.0}) {
+    const double yaw = b.allowed_yaw_rate(yaw_rate);
+    EXPECT_LE((b.allowed_speed(yaw) + to_wheel * std::abs(yaw)) / p.r, 18.0 + 1e-9) << yaw_rate;
+  }
+  EXPECT_NEAR(b.allowed_speed(10.0), 18.0 * p.r - 10.0 * to_wheel, 1e-9);
+  EXPECT_NEAR(b.allowed_yaw_rate(30.0), 18.0 * p.r / to_wheel, 1e-9);
 }
 
 TEST(Allocate, KeepsBalanceAndGivesYawTheRest) {
