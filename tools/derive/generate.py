@@ -12,11 +12,13 @@ import re
 import sys
 from pathlib import Path
 
-from . import mbbr_header, mip_header
+from . import mbbr_filter, mbbr_header, mip_header
 
 TARGETS = {
     "mbbr_model.hpp": mbbr_header.render,
     "mip_model.hpp": mip_header.render,
+    "mbbr_filter.hpp": mbbr_filter.render,
+    "mbbr_filter_steps.hpp": mbbr_filter.render_steps,
 }
 DEFAULT_FOLDER = Path(__file__).resolve().parents[2] / "config" / "generated"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:e[-+]?\d+)?(?!\w)")

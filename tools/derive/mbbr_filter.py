@@ -1,4 +1,4 @@
-"""config/generated/mbbr_filter.hpp: one step of the MBBR's default filter as straight-line code."""
+"""config/generated/mbbr_filter*.hpp: one step of the MBBR's default filter as straight-line code."""
 
 from __future__ import annotations
 
@@ -159,20 +159,27 @@ def update() -> list[str]:
     return em.lines()
 
 
+def _file(about: list[str], includes: str, body: list[str]) -> str:
+    about = [*about, "SI, rad. Source: docs/derivation.md. RT-safe."]
+    namespace = "equipoise::generated::mbbr_filter"
+    text = emit.header(about, "mbbr_filter.py", emit.input_hash(*INPUTS), namespace, body, ())
+    return text.replace("#pragma once\n\n", f"#pragma once\n\n{includes}\n")
+
+
 def render() -> str:
-    triangle = N * (N + 1) // 2
     places = noise_places()
     model = ", ".join(f"{{{ORDER[i]}, {ORDER[j]}}}" for i, j in places)
     inputs = ", ".join(f"{{{ORDER[i]}, {j}}}" for i, j in B_PLACES)
     order = ", ".join(map(str, ORDER))
     body = [
         f"inline constexpr int kStates = {N};",
-        f"inline constexpr int kTriangle = {triangle};  // of P, packed by rows in the order kOrder",
+        f"inline constexpr int kTriangle = {N * (N + 1) // 2};  // of P, packed by rows in the order kOrder",
         *emit.statement(f"inline constexpr int kOrder[kStates] = {{{order}}};", 0),
         f"inline constexpr int kNoises = {len(places)};  // entries of Q, (row, column) in the model's order",
         *emit.statement(f"inline constexpr int kNoise[kNoises][2] = {{{model}}};", 0),
         f"inline constexpr int kInputs = {len(B_PLACES)};  // entries of B, (state, input)",
         *emit.statement(f"inline constexpr int kInput[kInputs][2] = {{{inputs}}};", 0),
+        f"inline constexpr double kTickS = {DT};",
         "",
         "struct Constants {",
         "  mbbr::Coefficients<double> c;",
@@ -185,6 +192,13 @@ def render() -> str:
         "  double R[8];",
         "};",
         "",
+    ]
+    about = ["Constants and layout of the straight-line filter in mbbr_filter_steps.hpp; states as in MbbrEkfModel."]
+    return _file(about, '#include "generated/mbbr_model.hpp"\n', body)
+
+
+def render_steps() -> str:
+    body = [
         "/// x, P after a tick with input u.",
         "inline void predict(const Constants& k, const double u[3], double x[kStates], double P[kTriangle]) noexcept {",
         *predict(),
@@ -199,14 +213,7 @@ def render() -> str:
     ]
     about = [
         "One step of the MBBR's default filter, straight-line: midpoint prediction, F P F' as row operations on a packed",
-        "triangle, eight scalar measurements with masks instead of branches. States as in MbbrEkfModel, which is the",
-        "readable form and the reference in tests. SI, rad. Source: docs/derivation.md. RT-safe.",
+        "triangle, eight scalar measurements with masks instead of branches. MbbrEkfModel is the readable form and the",
+        "reference in tests.",
     ]
-    text = emit.header(
-        about,
-        "mbbr_filter.py",
-        emit.input_hash(*INPUTS),
-        "equipoise::generated::mbbr_filter",
-        body,
-    )
-    return text.replace("#include <cmath>\n", '#include <cmath>\n\n#include "generated/mbbr_model.hpp"\n')
+    return _file(about, '#include <cmath>\n\n#include "generated/mbbr_filter.hpp"\n', body)

@@ -7,9 +7,14 @@ scalar at a time, with a mask instead of a branch.
 
 from __future__ import annotations
 
+import re
+
 import sympy as sp
 
 from . import emit
+
+DEFINITION = re.compile(r"const double (t\d+) =")
+NAME = re.compile(r"\bt\d+\b")
 
 
 class Emitter:
@@ -43,7 +48,14 @@ class Emitter:
         self.statements.append(f"{target} = {value};")
 
     def lines(self) -> list[str]:
-        return [line for s in self.statements for line in emit.statement(s)]
+        """What is computed, without what nothing needs."""
+        needed, kept = set(), []
+        for s in reversed(self.statements):
+            target = DEFINITION.match(s)
+            if target is None or target[1] in needed:
+                needed |= set(NAME.findall(s.partition("=")[2]))
+                kept.append(s)
+        return [line for s in reversed(kept) for line in emit.statement(s)]
 
     def of(self, expression, values: dict) -> Value:
         """A SymPy expression of symbols in `values`; symbols named c.* are taken as they are."""

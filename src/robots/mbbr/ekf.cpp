@@ -100,10 +100,36 @@ void MbbrEkfModel::measure(const Vec<17>& x, const Vec3& u, Vec<8>& y, Mat<8, 17
   H.block<3, 2>(kWheel, kThetaX) = -wheels_from_ball_.leftCols<2>();
 }
 
+namespace kernel = generated::mbbr_filter;
+static_assert(kernel::kStates == MbbrEkfModel::kStates);
+
+kernel::Constants MbbrEkfModel::constants() const noexcept {
+  kernel::Constants k{};
+  k.c = c_;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(k.wheels) = wheels_from_ball_;
+  Eigen::Map<Vec2>(k.lever_arm) = lever_arm_;
+  k.g = kGravity_m_s2;
+  k.keep = keep_;
+  for (int i = 0; i < kernel::kInputs; ++i) k.B[i] = B_(kernel::kInput[i][0], kernel::kInput[i][1]);
+  return k;
+}
+
+MbbrPackedFilter packed_filter(const MbbrEkfModel& model,
+                               const KalmanFilter<MbbrEkfModel>::Params& params) noexcept {
+  kernel::Constants k = model.constants();
+  const Mat<17, 3> B = model.input_matrix();
+  Mat<17, 17> Q = B * params.input_variance.asDiagonal() * B.transpose();
+  Q.diagonal() += params.Q;
+  for (int i = 0; i < kernel::kNoises; ++i) k.Q[i] = Q(kernel::kNoise[i][0], kernel::kNoise[i][1]);
+  Eigen::Map<Vec<8>>(k.R) = params.R;
+  return {k, params.initial_variance};
+}
+
 MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
     : params_(params),
       kinematics_(robot),
-      filter_(Model(robot, params.disturbance_time_constant_s), params.filter),
+      model_(robot, params.disturbance_time_constant_s),
+      filter_(packed_filter(model_, params.filter)),
       time_(params.sensor_age_s) {
   start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
 }
@@ -159,7 +185,7 @@ MbbrEstimate MbbrEkf::estimate() const noexcept {
   Observable::State s = x().head<10>();
   time_.to_now([&](const Vec3& u, double dt) {
     const Observable::State then = s;
-    s = filter_.model().ahead(s, u + x().segment<3>(Model::kDisturbance), dt);
+    s = model_.ahead(s, u + x().segment<3>(Model::kDisturbance), dt);
     const double turn = 0.5 * dt * (then(Model::kThetaDotZ) + s(Model::kThetaDotZ));
     now.phi += dt * rotate(now.theta_z + 0.5 * turn, Vec2(0.5 * (then.tail<2>() + s.tail<2>())));
     now.theta_z += turn;

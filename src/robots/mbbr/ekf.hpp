@@ -9,6 +9,7 @@
 #include "equipoise/estimate/time_base.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/mbbr.hpp"
+#include "robots/mbbr/packed_filter.hpp"
 
 namespace equipoise {
 
@@ -43,6 +44,8 @@ class MbbrEkfModel {
   void measure(const Vec<17>& x, const Vec3& u, Vec<8>& y, Mat<8, 17>& H) const noexcept;
   /// The observable states after dt, without a Jacobian.
   MbbrObservable::State ahead(const MbbrObservable::State& x, const Vec3& u, double dt) const noexcept;
+  /// For the generated form of the filter, noises left open.
+  generated::mbbr_filter::Constants constants() const noexcept;
 
  private:
   MbbrCoefficients c_;
@@ -51,6 +54,10 @@ class MbbrEkfModel {
   double keep_;  // of the disturbance, per tick
   Mat<10, 3> B_;
 };
+
+/// KalmanFilter<MbbrEkfModel> in its generated form.
+MbbrPackedFilter packed_filter(const MbbrEkfModel& model,
+                               const KalmanFilter<MbbrEkfModel>::Params& params) noexcept;
 
 class MbbrEkf {
  public:
@@ -78,15 +85,18 @@ class MbbrEkf {
   Vec3 wheel_rate_rad_s() const noexcept;
 
   const Vec<17>& x() const noexcept { return filter_.x(); }
-  const Mat<17, 17>& P() const noexcept { return filter_.P(); }
+  Mat<17, 17> P() const noexcept { return filter_.P(); }
   /// gyro x, y, z, wheels, accelerometer x, y: squared innovation over its variance; 0 where not used.
   const std::array<double, 8>& row_nis() const noexcept { return filter_.row_nis(); }
-  double tilt_sigma_rad() const noexcept { return std::sqrt(P()(0, 0) + P()(1, 1)); }
+  double tilt_sigma_rad() const noexcept {
+    return std::sqrt(filter_.variance(Model::kThetaX) + filter_.variance(Model::kThetaY));
+  }
 
  private:
   Params params_;
   MbbrKinematics kinematics_;
-  KalmanFilter<Model> filter_;
+  Model model_;
+  MbbrPackedFilter filter_;  // KalmanFilter<Model> as straight-line code
   TimeBase<3, 3> time_;
   double gyro_bias_z_ = 0.0;
   double heading_ = 0.0;
