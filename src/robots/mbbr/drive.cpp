@@ -1,7 +1,6 @@
 #include "robots/mbbr/drive.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
 
 namespace equipoise {
 
@@ -22,22 +21,11 @@ Vec3 roller_rows(double rollers_per_turn, const Vec3& wheel_angle_rad) noexcept 
   return rows;
 }
 
-double grip_limit_N_m(double wheel_grip, const MbbrParameters& robot) noexcept {
-  const double load = robot.m_t * kGravity_m_s2 * normal_force_over_weight(robot.alpha_deg * kPi / 180.0);
-  return wheel_grip * load * robot.r_w;
-}
-
-Grip limit_by_grip(double torque_N_m, double limit_N_m, double motor_damping_N_m_s) noexcept {
-  const double passed = std::clamp(torque_N_m, -limit_N_m, limit_N_m);
-  return {passed, (torque_N_m - passed) / motor_damping_N_m_s};
-}
-
 MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p)
     : p_(p),
       kinematics_(robot),
       ratio_(robot.r / robot.r_w),
       wheel_radius_m_(robot.r_w),
-      grip_N_m_(Vec3::Constant(grip_limit_N_m(p.wheel_grip, robot))),
       contacts_(wheel_contacts(robot)),
       loads_from_force_(contacts_.inverse()),
       tilted_(kinematics_.T_ob()) {
@@ -53,7 +41,7 @@ Vec3 MbbrDrive::wheel_rates(const Vec3& relative_rate_B) const noexcept {
 }
 
 Vec3 MbbrDrive::wheel_torques(const Motors& motors, const Vec3& relative_rate_B) const noexcept {
-  const Vec3 torque = motors.torque(wheel_rates(relative_rate_B));
+  const Vec3 torque = motors.torque(wheel_rates(relative_rate_B) + slip_rad_s_);
   return engaged_.cwiseProduct(p_.wheel_torque_scale).cwiseProduct(torque) + ripple_N_m_;
 }
 
@@ -72,7 +60,7 @@ void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, co
     ripple_N_m_ = p_.roller_slip_N_m * (p_.rollers_per_turn * wheel_angle_rad).array().sin().matrix();
   }
   if (p_.gear.play_rad != 0.0) {
-    Vec3 motor_rate = wheel_rates(relative_rate_B);
+    Vec3 motor_rate = wheel_rates(relative_rate_B) + slip_rad_s_;
     for (int i = 0; i < Mbbr::kWheels; ++i) motor_rate(i) += gears_[static_cast<std::size_t>(i)].rate_rad_s();
     const Vec3 torque = motors.torque(motor_rate);
     for (int i = 0; i < Mbbr::kWheels; ++i) {
@@ -82,28 +70,31 @@ void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, co
 }
 
 Vec3 MbbrDrive::torque_B(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept {
-  Vec3 passed = wheel_torque;
-  Vec3 beyond = friction_B;
-  if (slips()) {
-    passed = contact_torques(wheel_torque, friction_B).cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
-    beyond *= 1.0 - p_.gearbox_friction_share;
-  }
-  if (!tilts()) return kinematics_.axes_from_wheels(passed) + beyond;
-  return ratio_ * (tilted_ * passed) + beyond;
+  const Vec3 passed = wheel_torque - lost_N_m_;
+  if (!tilts()) return kinematics_.axes_from_wheels(passed) + friction_B;
+  return ratio_ * (tilted_ * passed) + friction_B;
 }
 
-void MbbrDrive::slip_over(const Motors& motors, const Vec3& wheel_torque, const Vec3& friction_B,
-                          double step_s) noexcept {
-  const Vec3 torque = contact_torques(wheel_torque, friction_B);
-  for (int i = 0; i < Mbbr::kWheels; ++i) {
-    slip_rad_(i) += limit_by_grip(torque(i), grip_N_m_(i), motors.damping_N_m_s()).slip_rad_s * step_s;
-  }
+Vec3 MbbrDrive::loads_N(const Vec3& body_force_B, const Vec3& passed_N_m) const noexcept {
+  return loads_from_force_ * (body_force_B + pushes_ * passed_N_m / wheel_radius_m_);
 }
 
-void MbbrDrive::carry(const Vec3& body_force_B, const Vec3& wheel_torque, const Vec3& friction_B) noexcept {
-  const Vec3 passed = contact_torques(wheel_torque, friction_B).cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
-  const Vec3 normal_N = loads_from_force_ * (body_force_B + pushes_ * passed / wheel_radius_m_);
-  grip_N_m_ = p_.wheel_grip * wheel_radius_m_ * normal_N.cwiseMax(0.0);
+bool MbbrDrive::settle(const Vec3& contact_torque, const WheelLoads& loads, const Motors& motors,
+                       double step_s) noexcept {
+  // The motor's damping acts within the step: no step is too long for a light rotor.
+  const double inertia = p_.gear.rotor_inertia_kg_m2 + step_s * motors.damping_N_m_s();
+  const Vec3 sticking = contact_torque + inertia / step_s * slip_rad_s_;
+  const Vec3 passed = passed_on(sticking, loads, p_.wheel_grip * wheel_radius_m_);
+  const Vec3 lost = contact_torque - passed;
+  next_slip_rad_s_ = step_s / inertia * (sticking - passed);
+  const bool changed = lost != lost_N_m_;
+  lost_N_m_ = lost;
+  return changed;
+}
+
+void MbbrDrive::end_step(double step_s) noexcept {
+  slip_rad_s_ = next_slip_rad_s_;
+  slip_rad_ += step_s * slip_rad_s_;
 }
 
 Vec3 MbbrDrive::seen_rate_B(const Vec3& relative_rate_B) const noexcept {

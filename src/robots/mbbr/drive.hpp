@@ -9,6 +9,7 @@
 #include "equipoise/plant/gear_play.hpp"
 #include "equipoise/plant/motors.hpp"
 #include "robots/mbbr/mbbr.hpp"
+#include "robots/mbbr/wheel_grip.hpp"
 
 namespace equipoise {
 
@@ -28,14 +29,6 @@ Mat3 wheel_contacts(const MbbrParameters& robot) noexcept;
 /// Which row of each wheel carries it: +1 or -1.
 Vec3 roller_rows(double rollers_per_turn, const Vec3& wheel_angle_rad) noexcept;
 
-/// Torque that grip lets a wheel pass on, and how much faster the motor then turns.
-struct Grip {
-  double torque_N_m = 0.0;
-  double slip_rad_s = 0.0;
-};
-Grip limit_by_grip(double torque_N_m, double limit_N_m, double motor_damping_N_m_s) noexcept;
-double grip_limit_N_m(double wheel_grip, const MbbrParameters& robot) noexcept;
-
 class MbbrDrive {
  public:
   using Motors = SimulatedMotors<Mbbr::kWheels>;
@@ -48,13 +41,19 @@ class MbbrDrive {
 
   /// Of each motor at its wheel, before friction and grip.
   Vec3 wheel_torques(const Motors& motors, const Vec3& relative_rate_B) const noexcept;
-  /// On the ball, body axes: what the contacts pass on of motors and gears, and the friction beyond them.
+  /// On the ball, body axes: motors and friction, less what slipping contacts lose.
   Vec3 torque_B(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept;
+  /// Motor less the friction before the contact.
+  Vec3 contact_torques(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept;
+  /// Under a body force (mass times specific force of the body, less pushes) and torques that are passed on.
+  Vec3 loads_N(const Vec3& body_force_B, const Vec3& passed_N_m) const noexcept;
+  /// Settles over a step what each contact loses; false: as it was.
+  bool settle(const Vec3& contact_torque, const WheelLoads& loads, const Motors& motors,
+              double step_s) noexcept;
+  const Vec3& lost_N_m() const noexcept { return lost_N_m_; }
+  void lose(const Vec3& lost_N_m) noexcept { lost_N_m_ = lost_N_m; }
   /// Motors whose contacts slip run ahead.
-  void slip_over(const Motors& motors, const Vec3& wheel_torque, const Vec3& friction_B,
-                 double step_s) noexcept;
-  /// Loads on the contacts from now on; `body_force_B`: mass times specific force of the body, less pushes.
-  void carry(const Vec3& body_force_B, const Vec3& wheel_torque, const Vec3& friction_B) noexcept;
+  void end_step(double step_s) noexcept;
   bool slips() const noexcept { return p_.wheel_grip != 0.0; }
   /// Rate of the ball as the wheels' nominal axes report it.
   Vec3 seen_rate_B(const Vec3& relative_rate_B) const noexcept;
@@ -64,20 +63,20 @@ class MbbrDrive {
  private:
   bool tilts() const noexcept { return p_.roller_tilt_rad != 0.0; }
   Vec3 wheel_rates(const Vec3& relative_rate_B) const noexcept;
-  /// Motor less the friction before it.
-  Vec3 contact_torques(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept;
 
   MbbrDriveParams p_;
   MbbrKinematics kinematics_;
   double ratio_;
   double wheel_radius_m_;
-  Vec3 grip_N_m_;  // of each wheel under its load
   Mat3 contacts_;  // normals, columns
   Mat3 pushes_;    // directions in which the wheels push the ball, columns
   Mat3 loads_from_force_;
   Mat3 tilted_;  // axes of the rows that carry now, columns
   Vec3 engaged_ = Vec3::Ones();
   Vec3 ripple_N_m_ = Vec3::Zero();
+  Vec3 lost_N_m_ = Vec3::Zero();    // at the contacts, over this step
+  Vec3 slip_rad_s_ = Vec3::Zero();  // of the motors ahead of the ball
+  Vec3 next_slip_rad_s_ = Vec3::Zero();
   Vec3 slip_rad_ = Vec3::Zero();
   std::array<GearPlay, Mbbr::kWheels> gears_;
 };

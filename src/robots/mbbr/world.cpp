@@ -10,6 +10,8 @@ namespace {
 
 constexpr double kRollingStart_m_s = 0.005;  // below it rolling resistance fades
 
+constexpr int kRounds = 4;  // of friction against wheel slip
+
 enum At : int { kTheta = 0, kOmega = 3, kPhiDot = 6, kPhi = 8, kRelative = 10, kSlip = 13, kSpin = 15 };
 
 Vec<16> start_state(NoiseStream& noise, double sigma) {
@@ -191,13 +193,59 @@ void MbbrWorld::disturb() {
   s_(kRelative + 2) -= v(2);
 }
 
-void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a,
-                            double h) noexcept {
-  if (!drive_.slips()) return;
-  const Vec3 total_B = now.viscous_B + friction_B;
-  const Vec3 force_B = -robot_.m_t * dynamics_.accelerometer_B(now.motion, a, Vec3(0.0, 0.0, robot_.l));
-  drive_.slip_over(motors_, now.wheel_torque, total_B, h);
-  drive_.carry(force_B - now.loads.push_B, now.wheel_torque, total_B);
+/// `felt_under`: accelerations under a torque on the ball, linear in it.
+template <class Accelerations>
+bool MbbrWorld::settle_wheels(const Instant& free, const Vec3& friction_B, double h,
+                              Accelerations&& felt_under) noexcept {
+  const Vec3 total_B = free.viscous_B + friction_B;
+  const Vec3 contact = drive_.contact_torques(free.wheel_torque, total_B);
+  const Vec3 lost = drive_.lost_N_m();
+  const auto loads_N = [&](const Vec3& passed) {
+    drive_.lose(contact - passed);
+    const MbbrAccelerations a = felt_under(drive_.torque_B(free.wheel_torque, total_B));
+    const Vec3 com(0.0, 0.0, robot_.l);
+    const Vec3 force_B = -robot_.m_t * dynamics_.accelerometer_B(free.motion, a, com) - free.loads.push_B;
+    return drive_.loads_N(force_B, passed);
+  };
+  WheelLoads loads;
+  loads.coasting_N = loads_N(Vec3::Zero());
+  for (int i = 0; i < 3; ++i) loads.per_torque_1_m.col(i) = loads_N(Vec3::Unit(i)) - loads.coasting_N;
+  drive_.lose(lost);
+  return drive_.settle(contact, loads, motors_, h);
+}
+
+/// Friction and what the wheels lose belong to one instant, and each depends on the other.
+MbbrWorld::Instant MbbrWorld::rubbing(const Instant& free, double h) noexcept {
+  Instant start = free;
+  for (int round = 0;; ++round) {
+    friction_.axes_B = coulomb_torque_B(s_, start);
+    if (!drive_.slips() || round == kRounds) break;
+    const auto felt_under = [&](const Vec3& tau_B) {
+      const MbbrAccelerations more = dynamics_.response(free.motion, free.mass, tau_B - free.loads.tau_B);
+      return MbbrAccelerations{free.a.omega_dot_B + more.omega_dot_B,
+                               free.a.phi_ddot_inertial + more.phi_ddot_inertial};
+    };
+    if (!settle_wheels(free, friction_.axes_B, h, felt_under)) break;
+    start = with_friction(free, Vec3::Zero());
+  }
+  return with_friction(free, friction_.axes_B);
+}
+
+/// The same where the ball slides on the floor.
+void MbbrWorld::rubbing_on_floor(const Instant& free, double h) noexcept {
+  Instant start = free;
+  const auto mass = floor_.mass(free.motion);
+  for (int round = 0;; ++round) {
+    friction_ = slip_friction(s_, start, h);
+    if (!drive_.slips() || round == kRounds) return;
+    const auto felt_under = [&](const Vec3& tau_B) {
+      MbbrLoads loads = free.loads;
+      loads.tau_B = tau_B;
+      return felt_as_rolling(floor_.accelerations(free.motion, mass, loads, friction_.floor), robot_.r);
+    };
+    if (!settle_wheels(free, friction_.axes_B, h, felt_under)) return;
+    start.loads.tau_B = drive_.torque_B(free.wheel_torque, free.viscous_B);
+  }
 }
 
 void MbbrWorld::step(double h) noexcept {
@@ -206,19 +254,18 @@ void MbbrWorld::step(double h) noexcept {
   const Vec2 push = push_now();
   const Instant free = rolling(s_, push, Vec3::Zero());
   if (!slipping_) {
-    friction_.axes_B = coulomb_torque_B(s_, free);
-    const Instant now = with_friction(free, friction_.axes_B);
+    const Instant now = rubbing(free, h);
     slipping_ = floor_.limited() && !floor_.carries(floor_.needed(now.motion, now.loads, now.a));
     if (!slipping_) {
       if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
-      load_wheels(now, friction_.axes_B, now.a, h);
       s_ = rk4_step(s_, derivative(s_, now), h,
                     [&](const State& s) { return derivative(s, rolling(s, push, friction_.axes_B)); });
+      drive_.end_step(h);
       time_s_ += h;
       return;
     }
   }
-  friction_ = slip_friction(s_, free, h);
+  rubbing_on_floor(free, h);
   const auto sliding = [&](const State& s) {
     const Instant at = forces(s, push, friction_.axes_B);
     return floor_.accelerations(at.motion, floor_.mass(at.motion), at.loads, friction_.floor);
@@ -226,13 +273,13 @@ void MbbrWorld::step(double h) noexcept {
   const MbbrSlipAccelerations a = sliding(s_);
   const MbbrAccelerations felt_a = felt_as_rolling(a, robot_.r);
   if (sensors_.aged()) sensors_.feel(felt(free.motion, felt_a));
-  load_wheels(free, friction_.axes_B, felt_a, h);
   s_ = rk4_step(s_, slip_derivative(s_, free.motion, a), h,
                 [&](const State& s) { return slip_derivative(s, motion(s), sliding(s)); });
   if (friction_.floor_holds) {
     s_.segment<3>(kSlip).setZero();
     slipping_ = false;
   }
+  drive_.end_step(h);
   time_s_ += h;
 }
 

@@ -73,7 +73,11 @@ class MbbrWorld {
   Felt felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
   Felt felt_now() const noexcept;
   void step(double h) noexcept;
-  void load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a, double h) noexcept;
+  template <class Accelerations>
+  bool settle_wheels(const Instant& free, const Vec3& friction_B, double h,
+                     Accelerations&& felt_under) noexcept;
+  Instant rubbing(const Instant& free, double h) noexcept;
+  void rubbing_on_floor(const Instant& free, double h) noexcept;
   void disturb();
 
   MbbrParameters robot_;
