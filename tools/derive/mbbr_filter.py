@@ -127,7 +127,8 @@ def update() -> list[str]:
         {AT["dty"]: one, AT["tx"]: dtz, AT["dtz"]: tx + mx, AT["by"]: one, AT["mx"]: rate[2]},
         {
             AT["dtz"]: across,
-            AT["tx"]: -dty,
+            AT["tx"]: -dty - mx * dtz,
+            AT["ty"]: -my * dtz,
             AT["dty"]: -tx - mx,
             AT["dtx"]: my,
             AT["mx"]: -rate[1] - mx * rate[2],
