@@ -33,9 +33,11 @@ std::vector<double> frequency_grid(double period_s, int points_per_sign, double 
 }
 
 Margins margins(const std::vector<double>& omega_rad_s, const std::vector<std::complex<double>>& L,
-                double centre_rad_s) {
+                double centre_rad_s, double slow_rad_s) {
   Margins m{kInfinity, -kInfinity, kInfinity, kInfinity, kInfinity};
   for (std::size_t i = 0; i < L.size(); ++i) {
+    const double distance = std::min(std::abs(omega_rad_s[i]), std::abs(omega_rad_s[i] - centre_rad_s));
+    if (distance < slow_rad_s) continue;
     m.disk = std::min(m.disk, 2.0 * std::abs((1.0 + L[i]) / (1.0 - L[i])));
     if (i + 1 == L.size() || omega_rad_s[i] * omega_rad_s[i + 1] < 0.0) continue;
     if ((omega_rad_s[i] - centre_rad_s) * (omega_rad_s[i + 1] - centre_rad_s) < 0.0) continue;

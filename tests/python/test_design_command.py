@@ -80,10 +80,61 @@ def test_a_delay_in_the_chain_costs_as_much_delay_margin(root):
         return design(root, "mbbr", "--last-hz", "0", *off, *arguments)["rows"][0]["margins"]
 
     prompt, late = margins(), margins("--set=chain.gyro_delay_s=0.0017")
-    assert late["gyro"]["delay_ms"] == pytest.approx(prompt["gyro"]["delay_ms"] - 1.7, abs=0.2)  # sampled: not quite
+    assert late["gyro"]["delay_ms"] == pytest.approx(
+        prompt["gyro"]["delay_ms"] - 1.7, abs=0.2
+    )  # sampled: not quite
     late = margins("--set=chain.actuation_delay_s=0.002")
     assert late["u"]["gain_up_dB"] < prompt["u"]["gain_up_dB"]
     assert late["u"]["delay_ms"] < prompt["u"]["delay_ms"]
+
+
+AGE = "--set=estimator.ekf.sensor_age_s=0.0039"  # the filter knows how late the board's gyro is
+
+
+def shortfalls(design):
+    """Where the margins of a design are below what a built robot needs."""
+    for row in design["rows"]:
+        if not row["stable"]:
+            yield f"{row['yaw_hz']} Hz: unstable"
+        for place, m in row["margins"].items():
+            wanted = {"gain_up_dB": 6.0, "gain_down_dB": 6.0, "delay_ms": 6.0}
+            wanted["phase_deg"] = 35.0 if place == "encoder" else 40.0
+            for name, least in wanted.items():
+                if m[name] is not None and abs(m[name]) < least:
+                    yield f"{row['yaw_hz']} Hz, {place}: {name} {m[name]:.2f}"
+
+
+def test_the_shipped_ball_bot_has_margin_at_every_yaw_rate(root):
+    assert list(shortfalls(design(root, "mbbr", AGE))) == []
+
+
+def test_margins_tell_a_bad_weight_a_bad_filter_and_an_unknown_delay(root):
+    weight = "--set=controller.scheduled.design.phi_dot_rad_s=5.0"
+    assert any("encoder" in s for s in shortfalls(design(root, "mbbr", AGE, weight)))
+    noise = "--set=estimator.ekf.r=[2e-6,2e-6,2e-6,1e-6,1e-6,1e-6,1.41,1.41]"
+    assert any("encoder" in s for s in shortfalls(design(root, "mbbr", AGE, noise)))
+    assert any("gyro" in s for s in shortfalls(design(root, "mbbr")))
+
+
+@pytest.mark.parametrize("controller", ["slc", "lqr"])
+def test_the_shipped_edumip_is_stable_with_the_chain_in_the_loop(root, controller):
+    for row in design(root, "edumip", "--controller", controller, "--last-hz", "1.6", "--step-hz", "0.8")[
+        "rows"
+    ]:
+        assert row["stable"]
+        assert row["margins"]["u"]["phase_deg"] > 40
+        assert row["margins"]["u"]["delay_ms"] > 10
+
+
+def test_the_picture_is_drawn(root, tmp_path):
+    from equipoise_tools import design as picture
+
+    file = tmp_path / "design.json"
+    file.write_text(json.dumps(design(root, "mbbr", "--bode", "--step-hz", "3")))
+    assert picture.main([str(file), "--output", str(tmp_path / "design.png")]) == 0
+    assert (tmp_path / "design.png").read_bytes().startswith(b"\x89PNG")
+    file.write_text(json.dumps(design(root, "mbbr", "--last-hz", "0")))
+    assert picture.main([str(file), "--output", str(tmp_path / "none.png")]) == 2
 
 
 def test_an_unknown_choice_is_refused(root):

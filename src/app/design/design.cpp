@@ -17,6 +17,8 @@ struct Arguments {
   std::string json;
 };
 
+constexpr double kSlow_rad_s = 0.5;  // biases of the filter are slower, and than the answers are long
+
 constexpr std::array<const char*, 3> kBrokenAt{"u", "gyro", "encoder"};
 
 nlohmann::json number(double value) {
@@ -47,7 +49,8 @@ nlohmann::json judged(const Plant& plant, const Controller& settled, bool bode) 
   nlohmann::json row{{"stable", loop.stable}};
   const std::array<const std::vector<Complex>*, 3> L{&loop.at_u, &loop.at_gyro, &loop.at_encoder};
   for (std::size_t i = 0; i < L.size(); ++i) {
-    row["margins"][kBrokenAt[i]] = to_json(margins(loop.omega_rad_s, *L[i], plant.centre_rad_s()));
+    row["margins"][kBrokenAt[i]] =
+        to_json(margins(loop.omega_rad_s, *L[i], plant.centre_rad_s(), kSlow_rad_s));
     if (bode) row["loop"][kBrokenAt[i]] = complex_list(*L[i]);
   }
   if (bode) row["omega_rad_s"] = loop.omega_rad_s;
@@ -127,6 +130,11 @@ nlohmann::json mip_design(const Arguments& a) {
   const bool lqr = a.controller == "lqr";
   if (!lqr && !a.controller.empty() && a.controller != "slc")
     throw ConfigError("--controller " + a.controller + ": allowed: slc, lqr");
+
+  // Margins are those of the loop inside its limits.
+  constexpr double kUnlimited = 1e9;
+  c.reference.max_phi_error_rad = kUnlimited;
+  c.slc.max_lean_rad = c.slc.max_u = c.lqr.max_lean_rad = c.lqr.max_u = kUnlimited;
 
   const MipGains& g = c.slc.gains;
   nlohmann::json out{{"robot", "mip"},

@@ -59,6 +59,8 @@ Plant mip_plant(const MipParameters& p, double yaw_rate_rad_s, const Chain& chai
   for (SensorRow& row : plant.sensors) row.C = Eigen::RowVectorXcd::Zero(4);
   plant.sensors[kGyro].C(2) = 1.0;
   plant.sensors[kGyro].delay_s = chain.gyro_delay_s;
+  plant.sensors[kGyroAcross].C(0) = yaw_rate_rad_s;  // turning, a tilted body turns about its y too
+  plant.sensors[kGyroAcross].delay_s = chain.gyro_delay_s;
   plant.sensors[kEncoder].C(1) = 1.0;
   plant.sensors[kAccel].C(0) = c.accel_y_th + c.accel_y_th_dps2 * yaw_rate_rad_s * yaw_rate_rad_s;
   plant.sensors[kAccel].C(3) = c.accel_y_dph;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "app/design/whole_loop.hpp"
+#include "equipoise/sense/rotor_speed.hpp"
 #include "robots/mbbr/config.hpp"
 #include "robots/mip/config.hpp"
 
@@ -59,7 +60,7 @@ class MbbrController {
   }
 
  private:
-  Mbbr::Sample sample(const Readings& readings) const {
+  Mbbr::Sample sample(const Readings& readings) {
     Mbbr::Sample z;
     const auto xy = [&readings](Channel c) { return Vec2(readings[c].real(), readings[c].imag()); };
     z.imu_ok = z.encoders_ok = z.battery_ok = z.attitude_ok = true;
@@ -68,12 +69,14 @@ class MbbrController {
     Vec3 phi_B;
     phi_B << xy(kEncoder), -heading_;
     z.wheel_angle_rad = kinematics_.wheels_from_ball(phi_B);
+    z.wheel_rate_rad_s = rotor_speed_.update(z.wheel_angle_rad);
     z.attitude_rad << xy(kAttitude), heading_;
     return z;
   }
 
   MbbrParameters robot_;
   MbbrKinematics kinematics_;
+  RotorSpeed<Mbbr::kWheels> rotor_speed_;
   MbbrEstimators estimators_;
   MbbrReferenceStage reference_;
   Feedback feedback_;
@@ -111,18 +114,20 @@ class MipController {
   }
 
  private:
-  Mip::Sample sample(const Readings& readings) const {
+  Mip::Sample sample(const Readings& readings) {
     Mip::Sample z;
     z.imu_ok = z.encoders_ok = z.battery_ok = z.attitude_ok = true;
-    z.gyro_B_rad_s << readings[kGyro].real(), 0.0, yaw_rate_;
+    z.gyro_B_rad_s << readings[kGyro].real(), readings[kGyroAcross].real(), yaw_rate_;
     z.accel_B_m_s2 << 0.0, yaw_rate_ * yaw_rate_ * robot_.l_a.y() + readings[kAccel].real(), -kGravity_m_s2;
     z.wheel_angle_rad = kinematics_.wheels(readings[kEncoder].real(), heading_);
+    z.wheel_rate_rad_s = rotor_speed_.update(z.wheel_angle_rad);
     z.attitude_rad << readings[kAttitude].real(), 0.0, heading_;
     return z;
   }
 
   MipParameters robot_;
   MipKinematics kinematics_;
+  RotorSpeed<Mip::kWheels> rotor_speed_;
   MipEstimators estimators_;
   MipReferenceStage reference_;
   Feedback feedback_;

@@ -16,7 +16,7 @@
 
 namespace equipoise::app {
 
-enum Channel : std::size_t { kGyro, kEncoder, kAccel, kAttitude, kSensors };
+enum Channel : std::size_t { kGyro, kGyroAcross, kEncoder, kAccel, kAttitude, kSensors };
 using Readings = std::array<Complex, kSensors>;  // of a complex robot x + i y
 
 struct SensorRow {
