@@ -117,7 +117,7 @@ Loop whole_loop(const Plant& plant, const Controller& settled) {
     loop.at_encoder.push_back(-through[kEncoder] / (rest - (all - through[kEncoder])));
   }
 
-  constexpr int kStart = 1600;
+  constexpr int kStart = 4000;  // 20 s: large robots are slow
   ClosedLoop closed(plant);
   Controller controller = settled;
   Complex u{};
