@@ -91,7 +91,8 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   MotorCommand invert_bridges(Result& t) const noexcept {
     const double supply = bridge_.supply_V(t.z.battery_V, t.z.battery_ok);
-    const Wheels u = kinematics_.wheels_from_axes(t.u_friction);
+    const Wheels u = kinematics_.allocate(t.u_friction, supply / p_.motor.nominal_V);
+    t.saturated = (u - kinematics_.wheels_from_axes(t.u_friction)).cwiseAbs().maxCoeff() > 1e-9;
     MotorCommand motors{};
     for (int i = 0; i < Robot::kWheels; ++i) {
       const auto k = static_cast<std::size_t>(i);
@@ -110,8 +111,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     }
     if (!t.saturated) return t.u_lin;
     const double share = bridge_.supply_V(t.z.battery_V, t.z.battery_ok) / p_.motor.nominal_V;
-    const Wheels limited = kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-share).cwiseMin(share);
-    return kinematics_.axes_from_wheels(limited) - friction;
+    return kinematics_.axes_from_wheels(kinematics_.allocate(t.u_friction, share)) - friction;
   }
 
   /// Duties in the wheels' sense.

@@ -3,6 +3,7 @@
 // RT-safe after construction.
 #pragma once
 
+#include "equipoise/control/allocate.hpp"
 #include "equipoise/samples.hpp"
 #include "equipoise/types.hpp"
 #include "robots/mbbr/omniwheels.hpp"
@@ -50,6 +51,13 @@ class MbbrKinematics {
   Vec3 axes_from_wheels(const Vec3& wheels) const noexcept { return ratio_ * (T_ob_ * wheels); }
   Vec3 wheels_from_axes(const Vec3& axes_B) const noexcept {
     return (1.0 / ratio_) * (T_ob_.transpose() * axes_B);
+  }
+
+  /// Wheels within +-limit: balance, in the plane, before yaw.
+  Vec3 allocate(const Vec3& axes_B, double limit) const noexcept {
+    const Vec3 plane = wheels_from_axes(Vec3(axes_B.x(), axes_B.y(), 0.0));
+    const Vec3 yaw = wheels_from_axes(Vec3(0.0, 0.0, axes_B.z()));
+    return within(plane, yaw, limit);
   }
 
   const Mat3& T_ob() const noexcept { return T_ob_; }

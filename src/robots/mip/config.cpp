@@ -68,7 +68,9 @@ MipEstimatorParams read_estimators(Section s, const MipParameters& robot) {
 MipReferenceParams read_reference(Section s, double wheel_radius_m) {
   MipReferenceParams p;
   p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
+  p.max_jerk_m_s3 = s.number("max_jerk_m_s3", 0.01, 1e9);
   p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
+  p.budget.share = s.number("duty_share", 0.05, 1.0);
   p.max_phi_error_rad = s.number("max_phi_error_rad", 0.01, 1000.0);
   p.wheel_radius_m = wheel_radius_m;
   s.finish();
@@ -150,6 +152,9 @@ Loaded<MipConfig> read_mip(const Document& document) {
   c.estimators = read_estimators(root.table("estimator"), c.robot);
   c.reference = read_reference(root.table("reference"), c.robot.r);
 
+  c.reference.feasible_acceleration_m_s2 = feasible_acceleration_m_s2(c.robot);
+  c.reference.budget = mip_duty_budget(c.robot, c.reference.budget.share, c.friction.gain);
+
   Section controller = root.table("controller");
   Section slc = controller.table("slc");
   c.slc.published = slc.boolean("published");
@@ -161,6 +166,9 @@ Loaded<MipConfig> read_mip(const Document& document) {
   c.design.lqr = read_lqr_design(lqr.table("design"), &c.design.input_delay_s);
   lqr.finish();
   c.design.yaw = read_yaw_design(controller.table("yaw"));
+  if (const auto problem = design_problem(c.robot, c.design, c.motor.k1()))
+    (problem->parameter.empty() ? lqr.fail("design", problem->why)
+                                : robot.fail(problem->parameter, problem->why));
   c.slc.gains = c.lqr.gains = design_mip(c.robot, c.design);
   controller.finish();
   c.safety = config::read_safety(root.table("safety"));

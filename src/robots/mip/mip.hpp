@@ -4,6 +4,7 @@
 // body). RT-safe.
 #pragma once
 
+#include "equipoise/control/allocate.hpp"
 #include "equipoise/samples.hpp"
 #include "equipoise/types.hpp"
 
@@ -40,6 +41,11 @@ class MipKinematics {
   Wheels wheels_from_axes(const Input& u) const noexcept { return {u.x() + u.y(), u.x() - u.y()}; }
   Input axes_from_wheels(const Wheels& w) const noexcept {
     return {0.5 * (w.x() + w.y()), 0.5 * (w.x() - w.y())};
+  }
+
+  /// Wheels within +-limit: balance before yaw.
+  Wheels allocate(const Input& u, double limit) const noexcept {
+    return within<2>({u.x(), u.x()}, {u.y(), -u.y()}, limit);
   }
 
   /// Each gear has its own friction.
