@@ -14,6 +14,10 @@ from equipoise_tools import mujoco_client
 PLAIN = ["--set", "motor.bridge=drive_brake", "--set", "friction.compensation=0.0"]
 
 
+@pytest.mark.xfail(
+    strict=True,
+    reason="open: the engine's robot turns at 0.70 of the model's rate after one tick of equal duties",
+)
 def test_the_engines_robot_falls_and_spins_as_the_model_says(root, tmp_path):
     robot = mujoco_client.Robot(tilt_rad=0.1)
     robot.held = False
