@@ -1,5 +1,5 @@
-// The MBBR through loop, pipeline and world, one tick at a time, so that a test can interfere with the sample
-// or the command in between. With the default controller: ClosedLoop.
+// A robot through loop, pipeline and world, one tick at a time, so that a test can interfere with the sample
+// or the command in between. The MBBR with its default controller: ClosedLoop.
 #pragma once
 
 #include <string>
@@ -7,24 +7,21 @@
 #include "app/io/plant_backend.hpp"
 #include "app/run/firmware.hpp"
 #include "equipoise/runtime/loop.hpp"
+#include "support/config_files.hpp"
 #include "support/stepped_io.hpp"
 
 namespace equipoise {
 
-inline MbbrConfig mbbr_config() {
-  return load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", {}).config;
-}
+inline MbbrConfig mbbr_config() { return load_mbbr(config_file<app::MbbrFirmware>(), {}).config; }
 
 struct ClosedLoopOptions {
   Fidelity fidelity = Fidelity::kNominal;
   std::uint64_t seed = 1;
-  MbbrEstimatorId estimator = MbbrEstimatorId::kEkf;
+  std::string estimator = "ekf";
   bool compare = false;
 
   std::size_t level() const { return static_cast<std::size_t>(fidelity); }
-  app::Choice choice() const {
-    return {kMbbrEstimatorNames[static_cast<std::size_t>(estimator)], "", kFidelityNames[level()], compare};
-  }
+  app::Choice choice() const { return {estimator, "", kFidelityNames[level()], compare}; }
 };
 
 inline MbbrThesisPipeline::Params pipeline_params(const MbbrConfig& config, const MbbrThesisPipeline*) {
@@ -33,15 +30,24 @@ inline MbbrThesisPipeline::Params pipeline_params(const MbbrConfig& config, cons
 inline MbbrScheduledPipeline::Params pipeline_params(const MbbrConfig& config, const MbbrScheduledPipeline*) {
   return config.scheduled_pipeline();
 }
+inline MipSlcPipeline::Params pipeline_params(const MipConfig& config, const MipSlcPipeline*) {
+  return config.slc_pipeline();
+}
+inline MipLqrPipeline::Params pipeline_params(const MipConfig& config, const MipLqrPipeline*) {
+  return config.lqr_pipeline();
+}
 
-template <class Pipeline>
+template <class Pipeline, class Firmware = app::MbbrFirmware>
 class ClosedLoopWith {
  public:
+  using Config = typename Firmware::Config;
+  using World = typename Firmware::World;
   using Result = typename Pipeline::Result;
 
-  explicit ClosedLoopWith(const ClosedLoopOptions& options = {}, const MbbrConfig& configured = mbbr_config())
-      : config(app::MbbrFirmware::apply(configured, options.choice())),
-        world(app::MbbrFirmware::world(config, options.level(), options.seed)),
+  explicit ClosedLoopWith(const ClosedLoopOptions& options = {},
+                          const Config& configured = Firmware::load(config_file<Firmware>(), {}).config)
+      : config(Firmware::apply(configured, options.choice())),
+        world(Firmware::world(config, options.level(), options.seed)),
         pipeline(pipeline_params(config, static_cast<const Pipeline*>(nullptr))),
         backend_(world),
         hardware_(backend_.io()) {}
@@ -86,12 +92,12 @@ class ClosedLoopWith {
     return command;
   }
 
-  const MbbrConfig config;
-  MbbrWorld world;
+  const Config config;
+  World world;
   Pipeline pipeline;
 
  private:
-  app::PlantBackend<MbbrWorld> backend_;
+  app::PlantBackend<World> backend_;
   app::Hardware hardware_;
   const std::atomic<bool> never_{false};
 };

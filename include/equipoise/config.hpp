@@ -18,12 +18,22 @@ inline const std::vector<std::string> kFidelityNames{"ideal", "thesis", "nominal
 /// Name of the robot a file is for, without reading the rest.
 std::string robot_type(const std::string& path);
 
+/// A value of the configuration, as it was read.
+struct KeyFacts {
+  std::string key;      // estimator.ekf.q
+  std::string value;    // as TOML
+  std::string file;     // where it stands; empty: it came from --set, a board file or a calibration
+  int line = 0;         // from 1
+  std::string allowed;  // what reading it asks for
+};
+
 /// A robot's configuration as it was read.
 template <class Config>
 struct Loaded {
   Config config;
-  std::string sha256;  // of the effective configuration
-  std::string toml;    // the effective configuration
+  std::vector<KeyFacts> keys{};  // in the order of reading
+  std::string sha256;            // of the effective configuration
+  std::string toml;              // the effective configuration
 };
 
 }  // namespace equipoise

@@ -58,10 +58,10 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         bridge_(p.motor),
         safety_(p.safety) {}
 
-  /// `inhibit`: SafetyReason bits of the runtime (guard, overruns, ...) that forbid motors.
-  Result tick(const RawSample& raw, const Command& asked, std::uint32_t inhibit = 0) noexcept {
+  Result tick(const RawSample& raw, const Command& asked, const LoopState& loop) noexcept {
     Result t;
-    t.z = senses_.update(raw);                                         // counts -> SI; what of it is news
+    t.z = senses_.update(raw, loop.now_ns, wheel_rate_rad_s_, estimators_.reads_attitude());  // counts -> SI
+    bridge_gap(t.z, loop.inhibit);                                     // ticks that the loop has missed
     t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
     health_ = estimators_.health();
     t.degraded = do_without(t.z);
@@ -71,10 +71,13 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);
     t.u_friction = t.u_lin + friction;            // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
-    t.motors = safety_.gate(duty, checks(t, asked, inhibit));
+    t.motors = safety_.gate(duty, checks(t, asked, loop.inhibit));
     u_previous_ = applied_input(t, friction);
     duty_previous_ = wheel_duty(t.motors);
-    return judged(t, inhibit);
+    t.arm_state = safety_.state();
+    t.reasons = safety_.reasons();
+    t.inhibit = loop.inhibit;
+    return t;
   }
 
   Estimators& estimators() noexcept { return estimators_; }
@@ -89,16 +92,33 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     return reference_.update(command, x_hat);
   }
 
+  /// The model runs on through missed ticks, bounded by Freshness::kMaxTicks. The bridges held the last
+  /// command until the guard let go, if it did; then the motors coasted.
+  void bridge_gap(const typename Robot::Sample& z, std::uint32_t inhibit) noexcept {
+    if (!safety_.armed() || z.ticks <= 1) return;
+    typename Robot::Sample nothing = z;
+    nothing.imu_ok = nothing.encoders_ok = nothing.attitude_ok = false;
+    for (int missed = 1; missed < z.ticks; ++missed) {
+      estimators_.update(nothing, u_previous_, false);
+      if ((inhibit & kOverrun) == 0 || missed < kGuardTicks) continue;
+      health_ = estimators_.health();
+      u_previous_ = coasting(health_.predicts_wheels ? health_.wheel_rate_rad_s : z.wheel_rate_rad_s);
+    }
+  }
+
   /// The model's rate stands in for an encoder that is not to be had.
-  std::uint32_t do_without(typename Robot::Sample& z) const noexcept {
+  std::uint32_t do_without(typename Robot::Sample& z) noexcept {
+    wheel_rate_rad_s_ = z.wheel_rate_rad_s;
     if (!safety_.armed()) return 0;
     std::uint32_t degraded = health_.lost * kWithoutWheelOne;
     if (!z.imu_ok) degraded |= kWithoutImu;
+    if (health_.gyro_left_out) degraded |= kWithoutGyroAxis;
     if (!z.encoders_ok) degraded |= kWithoutEncoders;
     for (int i = 0; i < Robot::kWheels && health_.predicts_wheels; ++i) {
       const bool lost = !z.encoders_ok || (health_.lost >> i & 1U) != 0;
       if (lost) z.wheel_rate_rad_s(i) = health_.wheel_rate_rad_s(i);
     }
+    wheel_rate_rad_s_ = health_.predicts_wheels ? health_.wheel_rate_rad_s : z.wheel_rate_rad_s;
     return degraded;
   }
 
@@ -107,9 +127,18 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         encoder_check_.update(safety_.armed(), duty_previous_, z.wheel_angle_rad));
   }
 
+  Wheels within_supply(const Input& u, double limit) const noexcept {
+    if constexpr (Feedback::kSharesDuty) {
+      return kinematics_.allocate(u, limit);  // balance before yaw before travel
+    } else {
+      return kinematics_.wheels_from_axes(u).cwiseMax(-limit).cwiseMin(limit);
+    }
+  }
+
   MotorCommand invert_bridges(Result& t) const noexcept {
     const double supply = bridge_.supply_V(t.z.battery_V, t.z.battery_ok);
-    const Wheels u = kinematics_.wheels_from_axes(t.u_friction);
+    const Wheels u = within_supply(t.u_friction, supply / p_.motor.nominal_V);
+    t.saturated = (u - kinematics_.wheels_from_axes(t.u_friction)).cwiseAbs().maxCoeff() > 1e-9;
     MotorCommand motors{};
     for (int i = 0; i < Robot::kWheels; ++i) {
       const auto k = static_cast<std::size_t>(i);
@@ -123,13 +152,14 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   /// What the estimators' linear model has felt: the command before compensation, [T] section 6.1, as far as
   /// the supply allowed it; with coasting motors, the input that just cancels the back-EMF.
   Input applied_input(const Result& t, const Input& friction) const noexcept {
-    if (!t.motors.enable) {
-      return kinematics_.axes_from_wheels(t.z.wheel_rate_rad_s / p_.motor.no_load_rad_s(p_.motor.nominal_V));
-    }
+    if (!t.motors.enable) return coasting(t.z.wheel_rate_rad_s);
     if (!t.saturated) return t.u_lin;
     const double share = bridge_.supply_V(t.z.battery_V, t.z.battery_ok) / p_.motor.nominal_V;
-    const Wheels limited = kinematics_.wheels_from_axes(t.u_friction).cwiseMax(-share).cwiseMin(share);
-    return kinematics_.axes_from_wheels(limited) - friction;
+    return kinematics_.axes_from_wheels(within_supply(t.u_friction, share)) - friction;
+  }
+
+  Input coasting(const Wheels& rate_rad_s) const noexcept {
+    return kinematics_.axes_from_wheels(rate_rad_s / p_.motor.no_load_rad_s(p_.motor.nominal_V));
   }
 
   /// Duties in the wheels' sense.
@@ -146,26 +176,24 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     SafetyInputs in = safety_inputs(t.z, view(t.x_hat, p_.robot), encoder_check_, asked);
     if (health_.while_arming)
       (health_.stood_still ? in.encoders_stuck : in.encoders_reversed) |= health_.lost;
+    in.encoders_stuck |= health_.dead;
     in.encoders_in_check = in.encoders_in_check || health_.checking;
+    in.bias_drift_rad_s = health_.bias_drift_rad_s;
+    in.disturbance = health_.disturbance;
+    in.left_out = t.degraded & kSensorsLeftOut;
     in.tilt_sigma_rad = health_.tilt_sigma_rad;
-    in.slip_rad_s = slip_rad_s<Robot>(t, kinematics_, 0);
+    if (t.z.gyro_axis_ok[2] && !health_.gyro_left_out) in.slip_rad_s = slip_rad_s<Robot>(t, kinematics_, 0);
     in.saturated = t.saturated;
     in.all_finite = in.all_finite && t.u_friction.allFinite();
+    in.bridges_gaps = health_.predicts_wheels;
+    in.imu_trusted = health_.gyro_trusted && !t.z.accel_frozen;
     in.inhibit = inhibit;
     return in;
-  }
-
-  Result& judged(Result& t, std::uint32_t inhibit) const noexcept {
-    t.arm_state = safety_.state();
-    t.reasons = safety_.reasons();
-    t.inhibit = inhibit;
-    return t;
   }
 
   static FreshnessParams freshness_params(const Params& p) noexcept {
     FreshnessParams f;
     f.max_identical_samples = p.safety.max_identical_samples;
-    f.max_missed_samples = p.safety.max_missed_samples;
     // Half as fast again as a wheel without load, and a count of rounding.
     const double fastest_rad_s = 1.5 * p.motor.no_load_rad_s(p.motor.nominal_V);
     f.max_counts_per_tick = 1.0 + p.calibration.encoder_counts_per_rev / (2.0 * kPi) * fastest_rad_s * kTickS;
@@ -183,6 +211,9 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     return 0.0;
   }
 
+  static constexpr int kGuardTicks =
+      3;  // a loop that is silent for longer finds its motors off (runtime/heartbeat.hpp)
+
   Params p_;
   typename Robot::Kinematics kinematics_;
   Senses<Robot::kWheels> senses_;
@@ -194,6 +225,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Safety safety_;
   EstimatorHealth<Robot::kWheels> health_;
   Wheels duty_previous_ = Wheels::Zero();
+  Wheels wheel_rate_rad_s_ = Wheels::Zero();  // as expected in the next tick
   Input u_previous_ = Input::Zero();
 };
 

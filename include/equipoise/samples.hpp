@@ -45,10 +45,10 @@ struct Measurement {
   bool encoders_ok = false;
   bool battery_ok = false;
   bool attitude_ok = false;
-  bool imu_gap = false;                                    // more samples were lost than may be
-  bool encoder_jump = false;                               // further than a wheel can turn in a tick
-  bool bridge_fault = false;                               // a bridge complains
-  bool all_finite = true;                                  // of the raw sample
+  int ticks = 1;              // since the last sample, by the loop's clock: more than one after a stall
+  bool encoder_jump = false;  // an encoder jumps too often to be believed
+  bool accel_frozen = false;  // the accelerometer's counts stand still
+  bool bridge_fault = false;  // a bridge complains
   std::array<bool, 3> gyro_axis_ok{true, true, true};      // beside imu_ok: an axis that is known to be dead
   std::array<bool, Wheels> wheel_ok = all_true<Wheels>();  // beside encoders_ok: a wheel that lies
 };
@@ -60,6 +60,12 @@ struct Command {
   bool arm = false;
   bool heading_reset = false;
   double age_s = 0.0;  // since somebody last asked for it
+};
+
+/// What the loop tells the tick.
+struct LoopState {
+  std::int64_t now_ns = 0;    // its clock, at wake-up
+  std::uint32_t inhibit = 0;  // SafetyReason bits of the runtime (guard, overruns, ...)
 };
 
 /// Robot-neutral view of an estimate, a reference or the truth, for telemetry, metrics and safety.

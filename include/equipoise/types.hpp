@@ -21,11 +21,17 @@ inline constexpr double kTickS = 1.0 / kTickHz;  // dt
 inline constexpr double kGravity_m_s2 = 9.8;     // [T] Tables 3.2, 5.2
 inline constexpr double kPi = 3.14159265358979323846;
 
-/// Rz(angle) applied to a horizontal vector.
-inline Vec2 rotate(double angle_rad, const Vec2& v) noexcept {
-  const double c = std::cos(angle_rad);
-  const double s = std::sin(angle_rad);
-  return {c * v.x() - s * v.y(), s * v.x() + c * v.y()};
-}
+/// Rz(angle) of horizontal vectors, and back.
+class Turn {
+ public:
+  explicit Turn(double angle_rad) noexcept : c_(std::cos(angle_rad)), s_(std::sin(angle_rad)) {}
+  Vec2 operator()(const Vec2& v) const noexcept { return {c_ * v.x() - s_ * v.y(), s_ * v.x() + c_ * v.y()}; }
+  Vec2 back(const Vec2& v) const noexcept { return {c_ * v.x() + s_ * v.y(), c_ * v.y() - s_ * v.x()}; }
+
+ private:
+  double c_, s_;
+};
+
+inline Vec2 rotate(double angle_rad, const Vec2& v) noexcept { return Turn(angle_rad)(v); }
 
 }  // namespace equipoise

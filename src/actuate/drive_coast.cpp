@@ -32,25 +32,39 @@ double scaled_current(double t, double b, double d) noexcept {
   return (t + std::log1p(d * std::expm1(-t)) / d) / b;
 }
 
+/// s with scaled_current = r^2 / 2, six terms.
+double inverse_series(double r, double b) noexcept {
+  const double p = 1.0 + b;
+  const double b2 = b * b;
+  const double q = 1.0 + b2;
+  const double q2 = q * q + 265.0 * b2;
+  const double a3 = (q + 11.0 * b) * (1.0 / 36.0);
+  const double a4 = p * (25.0 * b - q) * (1.0 / 270.0);
+  const double a5 = (q2 + 22.0 * b * q) * (1.0 / 4320.0);
+  const double a6 = p * (q2 - 14.0 * b * q) * (1.0 / 17010.0);
+  return r * (1.0 + r * (p * (1.0 / 3.0) + r * (a3 + r * (a4 + r * (a5 + r * a6)))));
+}
+
 /// v T_r of scaled_current(t) = target, in s = expm1(t), away from the domain's edges: there nothing cancels.
 /// Starts from the inverse series, then Halley, whose derivatives are rational. With |log1p(s)| known, 1 + b
 /// s follows from the last step without another logarithm.
 double solve_inside(double target, double r, double b, double d, int* iterations) noexcept {
-  const double r2 = r * r;
-  double s = r + (1.0 + b) * r2 / 3.0 + (b * b + 11.0 * b + 1.0) * r2 * r / 36.0 -
-             (1.0 + b) * (b * b - 25.0 * b + 1.0) * r2 * r2 / 270.0;
+  double s = inverse_series(r, b);
   constexpr double kStepDone = 1e-4;  // of s; cubic convergence: what is left is near 1e-12
   double exponent = 0.0;
+  const double scale = b * d;
   for (*iterations = 0; *iterations < 2;) {
-    const double drained = std::log1p(b * s);
-    const double residual = (drained - b * std::log1p(s)) / (b * d) - target;
-    const double inverse = 1.0 / ((1.0 + b * s) * (1.0 + s));
-    const double slope = s * inverse;
-    const double curvature = (1.0 - b * s * s) * inverse * inverse;
-    const double step = residual * slope / (slope * slope - 0.5 * residual * curvature);
+    const double bs = b * s;
+    const double drained = std::log1p(bs);
+    const double residual = drained - b * std::log1p(s) - scale * target;
+    // Slope and curvature of the residual: scale s / product and scale (1 - b s^2) / product^2.
+    const double product = (1.0 + bs) * (1.0 + s);
+    const double slope = scale * s;
+    const double step =
+        residual * slope * product / (slope * slope - 0.5 * residual * scale * (1.0 - bs * s));
     ++*iterations;
     // log1p(b (s - step)) by its series about s: x is below 1e-2 after the series start.
-    const double x = b * step / (1.0 + b * s);
+    const double x = b * step / (1.0 + bs);
     exponent = drained - x * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * (0.2 + x / 6.0)))));
     s -= step;
     if (std::abs(step) < kStepDone * s) break;
@@ -68,10 +82,8 @@ double solve_at_edge(double target, double b, double d, double exponent_max, int
   constexpr double kSeriesStartBelow = 1.2;
   const double r = std::sqrt(2.0 * target);
   double t = 0.0;
-  if (r < kSeriesStartBelow) {  // inverse of the series above, four terms
-    const double r2 = r * r;
-    t = std::log1p(r + (1.0 + b) * r2 / 3.0 + (b * b + 11.0 * b + 1.0) * r2 * r / 36.0 -
-                   (1.0 + b) * (b * b - 25.0 * b + 1.0) * r2 * r2 / 270.0);
+  if (r < kSeriesStartBelow) {
+    t = std::log1p(inverse_series(r, b));
   } else {  // two steps of x <- K + b log1p(expm1(x)/b), which falls monotonically onto the root
     double x = std::min(bound, exponent_max);
     for (int i = 0; i < 2; ++i) x = b * d * target + b * std::log1p(std::expm1(x) / b);
@@ -123,6 +135,16 @@ double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept {
 
 DriveCoastInverse::DriveCoastInverse(double T_r) noexcept : T_r_(T_r), full_decay_(-std::expm1(-T_r)) {}
 
+/// (4.27) without its logarithm, as in DriveCoastCommand, and most often without its exponential: x / (1 - x)
+/// is above expm1(x), and x below it.
+bool DriveCoastInverse::discontinuous(double v, double b, double d) const noexcept {
+  if (!(T_r_ > 0.0)) return v < b;
+  const double x = (v - 1.0) * T_r_;
+  const double limit = -d * full_decay_;
+  if (x >= limit) return false;
+  return x < limit * (1.0 - x) || std::expm1(x) < limit;
+}
+
 DriveCoastSolution DriveCoastInverse::solve(double omega_r, double i_over_is) const noexcept {
   if (i_over_is == 0.0) return {};
   const double sign = i_over_is < 0.0 ? -1.0 : 1.0;
@@ -131,10 +153,7 @@ DriveCoastSolution DriveCoastInverse::solve(double omega_r, double i_over_is) co
   const double b = 0.5 * (1.0 + w);
   const double d = 0.5 * (1.0 - w);
   const double v_continuous = 0.5 * (g + 1.0 + w);  // (4.29)
-  // (4.27) without its logarithm, as in DriveCoastCommand.
-  const bool discontinuous =
-      T_r_ > 0.0 ? std::expm1((v_continuous - 1.0) * T_r_) < -d * full_decay_ : v_continuous < b;
-  if (!discontinuous) {
+  if (!discontinuous(v_continuous, b, d)) {
     if (v_continuous > 1.0) return {sign, 0, false};
     return {sign * v_continuous, 0, true};
   }

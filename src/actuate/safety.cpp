@@ -9,7 +9,9 @@ namespace {
 constexpr int kBatteryTicks = 100;         // half a second below the limit
 constexpr int kCutoffTicks = 5;            // rides through one conversion's spike
 constexpr int kBatteryUnknownTicks = 400;  // two seconds without a valid conversion
-constexpr int kBridgeTicks = 3;  // the driver has weighed the evidence; one bad read more decides nothing
+constexpr int kBridgeTicks = 3;   // the driver has weighed the evidence; one bad read more decides nothing
+constexpr int kStallEvery = 200;  // ticks; a loop that is late more often is broken
+constexpr int kLeftOutTicks = 5;  // of a surprise, with one sensor less
 constexpr int kFastTicks = 10;
 constexpr int kFallingTicks = 10;
 constexpr double kFreeFall_m_s2 = 0.2 * kGravity_m_s2;
@@ -40,10 +42,16 @@ std::uint32_t Safety::check_sensors(const SafetyInputs& in) noexcept {
   battery_gone_ = count(battery_gone_, !(in.battery_ok && in.battery_V < p_.cutoff_battery_V));
   battery_unknown_ = count(battery_unknown_, in.battery_ok);
 
-  const int missable = armed() ? p_.max_missed_samples : 0;
+  both_missed_ = count(both_missed_, in.imu_ok || in.encoders_ok);
+  const auto missable = [&](int bridged) {
+    return !armed() ? 0 : in.bridges_gaps ? bridged : p_.max_missed_samples;
+  };
+  const bool both = both_missed_ > missable(p_.max_missed_both);
   std::uint32_t reasons = 0;
-  if (imu_missed_ > missable || in.imu_gap) reasons |= kImuStale;
-  if (encoders_missed_ > missable) reasons |= kEncoderStale;
+  if (imu_missed_ > missable(p_.max_missed_imu) || both) reasons |= kImuStale;
+  if (encoders_missed_ > missable(p_.max_missed_encoders) || both) reasons |= kEncoderStale;
+  if (!in.imu_trusted) reasons |= kImuUntrusted;
+  if (armed() && !(in.bias_drift_rad_s <= p_.max_bias_drift_rad_s)) reasons |= kImuUntrusted;
   if (in.encoder_jump) reasons |= kEncoderJump;
   if (p_.needs_attitude && attitude_age_ > p_.max_attitude_age_ticks) reasons |= kAttitudeStale;
   if (battery_low_ >= kBatteryTicks || battery_gone_ >= kCutoffTicks ||
@@ -60,13 +68,18 @@ std::uint32_t Safety::check_sensors(const SafetyInputs& in) noexcept {
 
 std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   const double tilt = in.state.theta_rad.head<2>().norm();
+  const Vec2 falls = in.state.theta_rad.head<2>() + p_.fall_time_s * in.state.omega_B_rad_s.head<2>();
   const double nis = std::min(std::abs(in.state.normalized_innovation), kLargestInnovation);
   if (std::isfinite(nis)) innovation_ += kMean * (nis - innovation_);
   if (std::isfinite(in.slip_rad_s)) slip_ += kMean * (in.slip_rad_s - slip_);
+  // What was left out explains what was; what surprises after that is something else.
+  if ((in.left_out & ~left_out_) != 0) innovation_ = 0.0;
+  left_out_ = in.left_out;
   // A reversed encoder surprises the estimator, too: the check that can name the wheel goes first.
   surprised_ = count(surprised_,
                      in.encoders_in_check || !(innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation));
-  unhealthy_ = surprised_ > (unhealthy_ ? 0 : ticks(p_.max_innovation_s));
+  const int patience = left_out_ != 0 ? kLeftOutTicks : ticks(p_.max_innovation_s);
+  unhealthy_ = surprised_ > (unhealthy_ ? 0 : patience);
   falling_ = count(falling_, !(in.imu_ok && in.accel_m_s2 < kFreeFall_m_s2));
   const double fastest =
       std::abs(*std::max_element(in.wheel_rate_rad_s.begin(), in.wheel_rate_rad_s.end(),
@@ -75,11 +88,20 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
 
   std::uint32_t reasons = 0;
   if (!(tilt <= (armed() ? p_.max_tilt_rad : p_.max_arm_tilt_rad))) reasons |= kTilt;
+  if (armed() && !(falls.norm() <= p_.max_fall_rad)) reasons |= kTilt;
   if (!armed() && !(in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s)) reasons |= kGyroMoving;
   if (unhealthy_ || !(in.tilt_sigma_rad <= p_.max_tilt_sigma_rad)) reasons |= kEstimatorUnhealthy;
   if (std::abs(slip_) > p_.max_slip_rad_s) reasons |= kWheelSlip;
   if (fast_ >= kFastTicks || falling_ >= kFallingTicks) reasons |= kPickedUp;
   return reasons;
+}
+
+/// A stall that the estimator's model has bridged, and no other of late.
+bool Safety::rides_through(const SafetyInputs& in) noexcept {
+  const bool late = (in.inhibit & kOverrun) != 0;
+  const bool rare = since_stall_ > kStallEvery;
+  since_stall_ = late ? 0 : count(since_stall_, false);
+  return late && rare && armed() && in.bridges_gaps && in.ticks <= p_.max_stalled_ticks;
 }
 
 std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs& in) noexcept {
@@ -95,6 +117,7 @@ std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs
   std::uint32_t reasons = 0;
   if (bridge_faults_ >= kBridgeTicks) reasons |= kBridgeFault;
   if (stalled) reasons |= kStall;
+  if (armed() && !(in.disturbance <= p_.max_disturbance)) reasons |= kMotorFault;
   if (saturated_ > ticks(p_.max_saturated_s)) reasons |= kSaturated;
   return reasons;
 }
@@ -113,10 +136,11 @@ MotorCommand Safety::gate(const MotorCommand& wanted, const SafetyInputs& in) no
   reasons_ = check_sensors(in) | check_motion(in) | check_drive(wanted, in) | in.inhibit;
   if (!in.all_finite || !finite_and_bounded(wanted)) reasons_ |= kNotFinite;
   if (!armed() && !(in.command_age_s <= p_.command_timeout_s)) reasons_ |= kCommandStale;
-  const bool well = reasons_ == 0;
+  const bool let_go = rides_through(in);
+  const bool well = (reasons_ & ~(let_go ? kOverrun : 0U)) == 0;
   if (!in.arm_requested) reasons_ |= kNotRequested;
   transition(in.arm_requested, well);
-  if (!armed()) return {};
+  if (!armed() || let_go) return {};
   MotorCommand command = wanted;
   command.enable = true;
   return command;

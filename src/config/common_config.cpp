@@ -73,8 +73,16 @@ SafetyParams read_safety(Section s) {
   SafetyParams p;
   p.max_tilt_rad = s.number("max_tilt_rad", 0.05, 1.5);
   p.max_arm_tilt_rad = s.number("max_arm_tilt_rad", 0.01, 1.0);
+  p.max_fall_rad = s.number("max_fall_rad", 0.05, 10.0);
+  p.fall_time_s = s.number("fall_time_s", 0.0, 1.0);
   p.max_arm_rate_rad_s = s.number("max_arm_rate_rad_s", 0.01, 100.0);
   p.max_missed_samples = s.integer("max_missed_samples", 0, 20);
+  if (s.has("max_missed_imu")) {  // logs before them: no gap was bridged
+    p.max_missed_imu = s.integer("max_missed_imu", 0, 100);
+    p.max_missed_encoders = s.integer("max_missed_encoders", 0, 100);
+    p.max_missed_both = s.integer("max_missed_both", 0, 40);
+    p.max_stalled_ticks = s.integer("max_stalled_ticks", 1, 20);
+  }
   p.max_identical_samples = s.integer("max_identical_samples", 0, 1000);
   p.max_attitude_age_ticks = s.integer("max_attitude_age_ticks", 1, 200);
   p.min_battery_V = s.number("min_battery_V", 0.0, 60.0);
@@ -84,6 +92,8 @@ SafetyParams read_safety(Section s) {
   p.max_innovation_s = s.number("max_innovation_s", 0.0, 10.0);
   p.encoder_check_drive = s.number("encoder_check_drive", 0.0, 0.6);
   p.max_tilt_sigma_rad = s.number("max_tilt_sigma_rad", 0.01, 1.0);
+  p.max_bias_drift_rad_s = s.number("max_bias_drift_rad_s", 0.001, 1.0);
+  p.max_disturbance = s.number("max_disturbance", 0.01, 1000.0);
   p.max_slip_rad_s = s.number("max_slip_rad_s", 0.1, 1000.0);
   p.max_wheel_rate_rad_s = s.number("max_wheel_rate_rad_s", 1.0, 10000.0);
   p.max_saturated_s = s.number("max_saturated_s", 0.01, 60.0);

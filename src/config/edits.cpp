@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "config/nearest.hpp"
 #include "equipoise/config.hpp"
 
 namespace equipoise::config {
@@ -77,6 +78,7 @@ class SetText {
     toml::node* at = &root;
     std::size_t begin = 0;
     const std::string path = text_.substr(0, equals);
+    root_ = &root;
     for (bool last = false; !last;) {
       std::size_t end = path.find('.', begin);
       last = end == std::string::npos;
@@ -108,12 +110,12 @@ class SetText {
     toml::table* table = node->as_table();
     toml::node* found = table == nullptr ? nullptr : table->get(name);
     const bool new_include = name == "include" && value != nullptr && bracket == part.size();
-    if (table == nullptr || (found == nullptr && !new_include)) fail("no such key in the configuration");
+    if (table == nullptr || (found == nullptr && !new_include)) fail_unknown();
     if (bracket == part.size()) {
       if (value != nullptr) put(value, found, [&](auto& v) { table->insert_or_assign(name, std::move(v)); });
       return found;
     }
-    if (found == nullptr) fail("no such key in the configuration");
+    if (found == nullptr) fail_unknown();
     for (std::size_t open = bracket; open < part.size();) {
       const std::size_t close = part.find(']', open);
       const std::string index = part.substr(open + 1, close == std::string::npos ? close : close - open - 1);
@@ -158,7 +160,32 @@ class SetText {
     return text.substr(first, text.find_last_not_of(" \t") - first + 1);
   }
 
+  [[noreturn]] void fail_unknown() const {
+    std::string asked = text_.substr(0, text_.find('='));
+    const std::size_t bracket = asked.find('[');
+    if (bracket != std::string::npos) asked.resize(bracket);
+    std::vector<std::string> known;
+    keys_of(*root_, "", &known);
+    std::string hint = did_you_mean(asked, known);
+    for (std::size_t i = 0; i < known.size() && hint.empty(); ++i) {  // of a table that was left out
+      const std::string& key = known[i];
+      const std::size_t dot = key.rfind('.');
+      if (dot != std::string::npos && key.compare(dot + 1, std::string::npos, asked) == 0)
+        hint = "; did you mean " + key + "?";
+    }
+    fail("no such key in the configuration" + hint);
+  }
+
+  static void keys_of(const toml::table& table, const std::string& where, std::vector<std::string>* keys) {
+    for (const auto& [key, value] : table) {
+      const std::string name = (where.empty() ? "" : where + ".") + std::string(key.str());
+      keys->push_back(name);
+      if (value.is_table()) keys_of(*value.as_table(), name, keys);
+    }
+  }
+
   const std::string& text_;
+  mutable const toml::table* root_ = nullptr;  // while applying
 };
 
 template <std::size_t N>

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "config/edits.hpp"
+#include "config/nearest.hpp"
 
 namespace equipoise::config {
 namespace {
@@ -19,24 +20,7 @@ std::string shortest(double value) {
   return text.str();
 }
 
-std::string range(double min, double max) { return "allowed: " + shortest(min) + " to " + shortest(max); }
-
-/// Edit distance, for "did you mean".
-std::size_t distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t next =
-          std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U)});
-      diagonal = row[j];
-      row[j] = next;
-    }
-  }
-  return row[b.size()];
-}
+std::string range(double min, double max) { return shortest(min) + " to " + shortest(max); }
 
 }  // namespace
 
@@ -55,9 +39,11 @@ Document::Document(const std::string& path, const Overrides& overrides)
   }
 }
 
-Document Document::parse(const std::string& text, const std::string& origin) {
+Document Document::parse(const std::string& text, const std::string& origin,
+                         const std::vector<std::string>& set) {
   Document document(origin);
   document.root_ = parsed_text(text, origin);
+  for (const std::string& edit : set) apply_set(document.root_, edit);
   return document;
 }
 
@@ -80,7 +66,7 @@ std::string Document::sha256() const {
 void Section::fail(const std::string& key, const std::string& what) const {
   const toml::node* found = table_.get(key);
   const std::string where = at(document_.path(), found != nullptr ? found->source() : table_.source());
-  throw ConfigError(where + ": " + (name_.empty() ? key : name_ + "." + key) + ": " + what);
+  throw ConfigError(where + ": " + full_name(key) + ": " + what);
 }
 
 const toml::node& Section::node(const std::string& key) {
@@ -90,10 +76,20 @@ const toml::node& Section::node(const std::string& key) {
   return *found;
 }
 
+const toml::node& Section::value_node(const std::string& key, const std::string& allowed) {
+  const toml::node& found = node(key);
+  std::ostringstream value;
+  found.visit([&value](const auto& v) { value << v; });
+  const toml::source_region& source = found.source();
+  document_.keys_.push_back({full_name(key), value.str(), source.path ? *source.path : "",
+                             static_cast<int>(source.begin.line), allowed});
+  return found;
+}
+
 Section Section::table(const std::string& key) {
   const toml::table* found = node(key).as_table();
   if (found == nullptr) fail(key, "expected a table");
-  return Section(document_, *found, name_.empty() ? key : name_ + "." + key);
+  return Section(document_, *found, full_name(key));
 }
 
 std::vector<Section> Section::tables(const std::string& key, std::size_t min, std::size_t max) {
@@ -107,35 +103,37 @@ std::vector<Section> Section::tables(const std::string& key, std::size_t min, st
   std::vector<Section> sections;
   for (std::size_t i = 0; i < array->size(); ++i) {
     sections.emplace_back(document_, *array->get_as<toml::table>(i),
-                          (name_.empty() ? key : name_ + "." + key) + "[" + std::to_string(i) + "]");
+                          full_name(key) + "[" + std::to_string(i) + "]");
   }
   return sections;
 }
 
 double Section::number(const std::string& key, double min, double max) {
-  const auto value = node(key).value<double>();
+  const auto value = value_node(key, range(min, max)).value<double>();
   if (!value) fail(key, "expected a number");
   if (!std::isfinite(*value) || *value < min || *value > max)
-    fail(key, shortest(*value) + " is out of range; " + range(min, max));
+    fail(key, shortest(*value) + " is out of range; allowed: " + range(min, max));
   return *value;
 }
 
 int Section::integer(const std::string& key, int min, int max) {
-  const auto value = node(key).value_exact<std::int64_t>();
+  const auto value = value_node(key, "whole numbers, " + range(min, max)).value_exact<std::int64_t>();
   if (!value) fail(key, "expected a whole number");
   if (*value < min || *value > max)
-    fail(key, std::to_string(*value) + " is out of range; " + range(min, max));
+    fail(key, std::to_string(*value) + " is out of range; allowed: " + range(min, max));
   return static_cast<int>(*value);
 }
 
 bool Section::boolean(const std::string& key) {
-  const auto value = node(key).value_exact<bool>();
+  const auto value = value_node(key, "true or false").value_exact<bool>();
   if (!value) fail(key, "expected true or false");
   return *value;
 }
 
-std::string Section::text(const std::string& key) {
-  const auto value = node(key).value_exact<std::string>();
+std::string Section::text(const std::string& key) { return string_value(key, "a string"); }
+
+std::string Section::string_value(const std::string& key, const std::string& allowed) {
+  const auto value = value_node(key, allowed).value_exact<std::string>();
   if (!value) fail(key, "expected a string");
   return *value;
 }
@@ -148,7 +146,7 @@ std::pair<std::string, int> Section::pair_of(const toml::node& node, const std::
   const auto number = pair->get(1)->value_exact<std::int64_t>();
   if (!text || !number) fail(key, "expected a pair of a string and a whole number");
   if (*number < min || *number > max)
-    fail(key, std::to_string(*number) + " is out of range; " + range(min, max));
+    fail(key, std::to_string(*number) + " is out of range; allowed: " + range(min, max));
   return {*text, static_cast<int>(*number)};
 }
 
@@ -167,18 +165,17 @@ std::vector<std::pair<std::string, int>> Section::texts_and_integers(const std::
 }
 
 std::size_t Section::choice(const std::string& key, const std::vector<std::string>& names) {
-  const std::string value = text(key);
+  std::string allowed;
+  for (const std::string& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
+  const std::string value = string_value(key, allowed);
   const auto found = std::find(names.begin(), names.end(), value);
-  if (found == names.end()) {
-    std::string allowed;
-    for (const std::string& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
-    fail(key, "\"" + value + "\" is not known; allowed: " + allowed);
-  }
+  if (found == names.end()) fail(key, "\"" + value + "\" is not known; allowed: " + allowed);
   return static_cast<std::size_t>(found - names.begin());
 }
 
 std::vector<double> Section::numbers(const std::string& key, std::size_t count, double min, double max) {
-  const toml::array* array = node(key).as_array();
+  const toml::array* array =
+      value_node(key, std::to_string(count) + " numbers, each " + range(min, max)).as_array();
   if (array == nullptr || array->size() != count)
     fail(key, "expected an array of " + std::to_string(count) + " numbers");
   std::vector<double> values;
@@ -186,7 +183,7 @@ std::vector<double> Section::numbers(const std::string& key, std::size_t count, 
     const auto value = element.value<double>();
     if (!value) fail(key, "expected an array of " + std::to_string(count) + " numbers");
     if (!std::isfinite(*value) || *value < min || *value > max) {
-      fail(key, shortest(*value) + " is out of range; " + range(min, max));
+      fail(key, shortest(*value) + " is out of range; allowed: " + range(min, max));
     }
     values.push_back(*value);
   }
@@ -205,22 +202,12 @@ void Section::finish() const {
   for (const auto& [key, value] : table_) {
     const std::string name(key.str());
     if (asked_.count(name) != 0) continue;
-    std::string nearest;
-    std::size_t best = 4;
-    for (const std::string& known : asked_) {
-      const std::size_t d = distance(name, known);
-      if (d < best) {
-        best = d;
-        nearest = known;
-      }
-    }
-    const std::string hint = nearest.empty() ? "" : "; did you mean " + nearest + "?";
     std::string message = at(document_.path(), value.source());
     message += ": ";
     if (!name_.empty()) message += name_ + ".";
     message += name;
     message += ": unknown key";
-    throw ConfigError(message + hint);
+    throw ConfigError(message + did_you_mean(name, {asked_.begin(), asked_.end()}));
   }
 }
 

@@ -18,20 +18,26 @@ namespace equipoise::config {
 class Document {
  public:
   Document(const std::string& path, const Overrides& overrides);
-  /// From text; `origin` takes the path's place in errors.
-  static Document parse(const std::string& text, const std::string& origin);
+  /// From text; `origin` takes the path's place in errors. `set`: as of --set.
+  static Document parse(const std::string& text, const std::string& origin,
+                        const std::vector<std::string>& set = {});
 
   const toml::table& root() const { return root_; }
   const std::string& path() const { return path_; }
   /// The effective configuration, and its SHA-256 in hex.
   std::string canonical() const;
   std::string sha256() const;
+  /// What its sections have read.
+  const std::vector<KeyFacts>& keys() const { return keys_; }
 
  private:
+  friend class Section;
   explicit Document(std::string path) : path_(std::move(path)) {}
 
   std::string path_;
   toml::table root_;
+  mutable std::vector<KeyFacts>
+      keys_;  // sections read a document that does not change, and note what they read
 };
 
 /// One table; `finish` refuses keys that nobody asked for.
@@ -72,6 +78,10 @@ class Section {
 
  private:
   const toml::node& node(const std::string& key);
+  std::string string_value(const std::string& key, const std::string& allowed);
+  /// The same for a value, which is noted.
+  const toml::node& value_node(const std::string& key, const std::string& allowed);
+  std::string full_name(const std::string& key) const { return name_.empty() ? key : name_ + "." + key; }
   std::pair<std::string, int> pair_of(const toml::node& node, const std::string& key, int min, int max) const;
 
   const Document& document_;

@@ -8,6 +8,11 @@
 namespace equipoise {
 namespace {
 
+// One instantiation each: a product or a factorisation per expression type would compile for half a minute.
+CMatrix product(const CMatrix& a, const CMatrix& b) { return a * b; }
+CMatrix adjoint(const CMatrix& a) { return a.adjoint(); }
+CMatrix solve(const CMatrix& a, const CMatrix& b) { return a.partialPivLu().solve(b); }
+
 /// Scaling and squaring; the scaled norm is below 1/2, where 14 terms leave less than 1e-16.
 CMatrix exponential(const CMatrix& M) {
   const double norm = M.cwiseAbs().rowwise().sum().maxCoeff();
@@ -17,10 +22,10 @@ CMatrix exponential(const CMatrix& M) {
   CMatrix sum = CMatrix::Identity(M.rows(), M.cols());
   CMatrix term = sum;
   for (int k = 1; k <= 14; ++k) {
-    term = (term * scaled / static_cast<double>(k)).eval();
+    term = product(term, scaled) / static_cast<double>(k);
     sum += term;
   }
-  for (int k = 0; k < squarings; ++k) sum = (sum * sum).eval();
+  for (int k = 0; k < squarings; ++k) sum = product(sum, sum);
   return sum;
 }
 
@@ -51,25 +56,29 @@ Hold hold(const CMatrix& A, const CMatrix& B, double t) {
 SampledSystem sampled(const CMatrix& A, const CMatrix& B, double period, double delay) {
   const Hold fresh = hold(A, B, period - delay);  // under the new input, at the end of the period
   const Hold late = hold(A, B, delay);            // under the old one, at its start
-  return {fresh.A * late.A, fresh.B, fresh.A * late.B};
+  return {product(fresh.A, late.A), fresh.B, product(fresh.A, late.B)};
 }
 
 CMatrix riccati(const CMatrix& A_in, const CMatrix& B, const CMatrix& Q, const CMatrix& R) {
   const Eigen::Index n = A_in.rows();
   CMatrix A = A_in;
-  CMatrix G = B * R.partialPivLu().solve(B.adjoint());
+  CMatrix G = product(B, solve(R, adjoint(B)));
   CMatrix H = Q;
+  CMatrix right(n, 2 * n);
   constexpr int kMaxDoublings = 60;  // 2^60 ticks: a pole at 1 - 1e-16 has settled
   for (int k = 0; k < kMaxDoublings; ++k) {
-    const Eigen::PartialPivLU<CMatrix> W(CMatrix::Identity(n, n) + G * H);
-    const CMatrix WA = W.solve(A);
-    const CMatrix WG = W.solve(G);
-    const CMatrix change = A.adjoint() * H * WA;
-    G += A * WG * A.adjoint();
+    right.leftCols(n) = A;
+    right.rightCols(n) = G;
+    const CMatrix solved = solve(CMatrix::Identity(n, n) + product(G, H), right);
+    const CMatrix WA = solved.leftCols(n);
+    const CMatrix WG = solved.rightCols(n);
+    const CMatrix A_adjoint = adjoint(A);
+    const CMatrix change = product(product(A_adjoint, H), WA);
+    G += product(product(A, WG), A_adjoint);
     H += change;
-    A = (A * WA).eval();
-    G = (0.5 * (G + G.adjoint())).eval();
-    H = (0.5 * (H + H.adjoint())).eval();
+    A = product(A, WA);
+    G = 0.5 * (G + adjoint(G));
+    H = 0.5 * (H + adjoint(H));
     const double size = H.norm();
     if (!std::isfinite(size) || change.norm() <= 1e-16 * size) break;
   }
@@ -86,15 +95,21 @@ CMatrix lqr(const SampledSystem& system, const Eigen::VectorXd& state_weights,
   CMatrix Q = CMatrix::Zero(plant.A.rows(), plant.A.rows());
   Q.diagonal().head(n) = state_weights.cast<Complex>();
   const CMatrix X = riccati(plant.A, plant.B, Q, R);
-  const CMatrix BX = plant.B.adjoint() * X;
+  const CMatrix BX = product(adjoint(plant.B), X);
   CMatrix K = CMatrix::Zero(m, n + m);
-  K.leftCols(plant.A.rows()) = (R + BX * plant.B).partialPivLu().solve(BX * plant.A);
+  K.leftCols(plant.A.rows()) = solve(R + product(BX, plant.B), product(BX, plant.A));
   return K;
+}
+
+Eigen::VectorXcd eigenvalues(const CMatrix& A) {
+  const CMatrix H = Eigen::HessenbergDecomposition<CMatrix>(A).matrixH();
+  Eigen::ComplexSchur<CMatrix> schur(A.rows());
+  return schur.computeFromHessenberg(H, H, false).matrixT().diagonal();
 }
 
 Eigen::VectorXcd closed_loop_poles(const SampledSystem& system, const CMatrix& K) {
   const Hold plant = with_input_before(system);
-  return Eigen::ComplexEigenSolver<CMatrix>(plant.A - plant.B * K, false).eigenvalues();
+  return eigenvalues(plant.A - product(plant.B, K));
 }
 
 double largest_pole(const SampledSystem& system, const CMatrix& K) {

@@ -5,8 +5,8 @@
 #include <array>
 #include <string>
 
+#include "equipoise/actuate/safety.hpp"
 #include "equipoise/config.hpp"
-#include "equipoise/pipeline.hpp"
 #include "equipoise/plant/world.hpp"
 
 namespace equipoise {

@@ -75,6 +75,12 @@ class Telemetry::Writer {
     ++report_->records;
   }
 
+  void end(const EndRecord& end) {
+    publish_now_ = lcm_ != nullptr;
+    emit(fields::End{}, fields::kEndChannel, end);
+    log_.end_tick();
+  }
+
   void close_log() {
     log_.close();
     note_failure();
@@ -83,6 +89,7 @@ class Telemetry::Writer {
  private:
   template <class Message, class Record>
   void emit(Message message, const char* channel, const Record& record) {
+    if (!log_.is_open() && !publish_now_) return;  // nobody would read it
     encode(message, record, utime_, tick_, &buffer_);
     log_.event(utime_, channel, buffer_);
     if (publish_now_) publish(channel);
@@ -136,7 +143,7 @@ Telemetry::Telemetry(const TelemetryOptions& options)
       writer_(std::make_unique<Writer>(options_, &report_, &log_failed_)),
       thread_([this] { run(); }) {}
 
-Telemetry::~Telemetry() { finish(); }
+Telemetry::~Telemetry() { join(); }
 
 void Telemetry::hand_over(const TickRecord& record) noexcept {
   while (!queue_.push(record)) {
@@ -160,10 +167,16 @@ void Telemetry::run() {
     if (stopping) break;
     if (!any) std::this_thread::sleep_for(kIdle);
   }
+  if (end_) writer_->end(*end_);
   writer_->close_log();
 }
 
-TelemetryReport Telemetry::finish() {
+TelemetryReport Telemetry::finish(const EndRecord& end) {
+  if (thread_.joinable()) end_ = end;
+  return join();
+}
+
+TelemetryReport Telemetry::join() {
   stop_.store(true, std::memory_order_release);
   if (thread_.joinable()) thread_.join();
   report_.dropped = dropped_.load();

@@ -150,6 +150,7 @@ TEST(FieldList, IsWhatTheLcmTypesDeclare) {
       none, [](auto message, const char*, const auto& record) { expect_same_layout(message, record); });
   expect_same_layout(fields::Histogram{}, fields::HistogramRecord{});
   expect_same_layout(fields::Run{}, runtime::RunInfo{});
+  expect_same_layout(fields::End{}, runtime::EndRecord{});
 }
 
 TEST(FieldList, HoldsEveryByteOfASampleAndOfAState) {
@@ -172,6 +173,7 @@ TEST(FieldList, EncodesWhatGeneratedCodeDecodes) {
   expect_generated_code_agrees<timing_t>(fields::Timing{}, TickRecord{});
   expect_generated_code_agrees<timing_histogram_t>(fields::Histogram{}, fields::HistogramRecord{});
   expect_generated_code_agrees<run_t>(fields::Run{}, runtime::RunInfo{});
+  expect_generated_code_agrees<verdict_t>(fields::End{}, runtime::EndRecord{});
 }
 
 TEST(FieldList, PutsEachFieldWhereTheGeneratedCodeLooksForIt) {

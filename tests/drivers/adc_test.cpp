@@ -26,6 +26,20 @@ TEST_F(AdcTest, ReadsItsChannelOfTheNamedDevice) {
   EXPECT_EQ(counts, 4095);
 }
 
+TEST_F(AdcTest, DescriptorZeroIsOneLikeAnyOtherAndIsClosedOnce) {
+  addAdc("TI-am335x-adc", 0);
+  const int before = openDescriptors();
+  {
+    const NoStdin none;
+    ASSERT_EQ(adc_open(&adc_, "TI-am335x-adc", 0), 0);
+    EXPECT_EQ(adc_.fd, 0);
+    adc_close(&adc_);
+  }
+  EXPECT_EQ(adc_.fd, -1);
+  adc_close(&adc_);
+  EXPECT_EQ(openDescriptors(), before);
+}
+
 TEST_F(AdcTest, ReportsMissingDeviceAndChannel) {
   EXPECT_EQ(adc_open(&adc_, "TI-am335x-adc", 6), -ENODEV);
   addAdc("TI-am335x-adc", 0);

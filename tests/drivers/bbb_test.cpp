@@ -198,6 +198,8 @@ TEST_F(BbbTest, CloseLeavesMotorsOffAndNothingHeld) {
 TEST_F(BbbTest, BridgeFaultIsReportedWhileDriven) {
   open();
   FakeGpio::instance().line("4804c000", 17).active = true;
+  ASSERT_EQ(write(0.0, 1.0, -1.0), 0);
+  EXPECT_EQ(tickAndRead().health, 0u);  // the others are well
   ASSERT_EQ(write(1.0, 0.0, 0.0), 0);
   EXPECT_EQ(tickAndRead().health, uint32_t{RIO_BRIDGE_FAULT});
   bbb_status_t status;
@@ -214,6 +216,56 @@ TEST_F(BbbTest, GuardMayHoldTheEnableLine) {
   ASSERT_EQ(write(0.5, 0.5, 0.5), 0);
   EXPECT_EQ(duties()[0], "25000");
   EXPECT_EQ(rio_motors_off(&io_), 0);
+}
+
+TEST_F(BbbTest, BeforeTheFirstEdgeThereIsNoSample) {
+  open();
+  rio_sensors_t sample{};
+  ASSERT_EQ(rio_read_sensors(&io_, &sample), 0);
+  EXPECT_EQ(sample.valid & RIO_IMU, 0u);
+  EXPECT_EQ(sample.health & RIO_IMU_LATE, uint32_t{RIO_IMU_LATE});
+}
+
+TEST_F(BbbTest, ABoardThatOpensHasNothingToComplainOf) {
+  bbb_error_t error{};
+  ASSERT_EQ(bbb_open(&config_, &io_, &error), 0);
+  EXPECT_STREQ(error.text, "");
+}
+
+TEST_F(BbbTest, TheNumberOfMotorsAndTheirFrequencyHaveBounds) {
+  const auto opened = [&](auto&& change) {
+    const bbb_config_t kept = config_;
+    change(config_);
+    bbb_error_t error{};
+    const int status = bbb_open(&config_, &io_, &error);
+    if (status == 0) rio_close(&io_);
+    io_ = {};
+    config_ = kept;
+    return status;
+  };
+  EXPECT_EQ(opened([](auto& c) { c.motors = 1; }), 0);
+  EXPECT_EQ(opened([](auto& c) { c.motors = 0; }), -EINVAL);
+  EXPECT_EQ(opened([](auto& c) { c.motors = RIO_MAX_MOTORS + 1; }), -EINVAL);
+  EXPECT_EQ(opened([](auto& c) { c.pwm_hz = 100; }), 0);
+  EXPECT_EQ(opened([](auto& c) { c.pwm_hz = 99; }), -EINVAL);
+  EXPECT_EQ(opened([](auto& c) { c.pwm_hz = 100001; }), -EINVAL);
+  EXPECT_EQ(opened([](auto& c) { c.imu.dmp_firmware[0] = 'x'; }), -ENOENT);  // a file of one letter
+}
+
+TEST_F(BbbTest, LeavesNoDescriptorOpenWhetherItOpensOrNot) {
+  open();  // the emulated buses open what they keep
+  rio_close(&io_);
+  io_ = {};
+  const int before = openDescriptors();
+  open();
+  EXPECT_GT(openDescriptors(), before);
+  rio_close(&io_);
+  io_ = {};
+  EXPECT_EQ(openDescriptors(), before);
+  imu.setWhoAmI(0x68);
+  bbb_error_t error{};
+  EXPECT_EQ(bbb_open(&config_, &io_, &error), -ENODEV);
+  EXPECT_EQ(openDescriptors(), before);
 }
 
 TEST_F(BbbTest, EveryMissingPartIsNamedAndLeavesMotorsOff) {

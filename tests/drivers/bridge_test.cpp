@@ -167,6 +167,18 @@ TEST_F(BridgeTest, StatusFlagAtFullDutyIsAFaultAtOnce) {
   EXPECT_EQ(mc33926_sample_fault(&motor_, &fault), -EIO);
 }
 
+TEST_F(BridgeTest, PwmUpToTheBridgesLimitAndNoFaster) {
+  tb6612_t motor{};
+  hbridge_config_t config = config_;
+  config.period_ns = 1000000000u / TB6612_MAX_PWM_HZ;
+  const char* culprit = nullptr;
+  EXPECT_EQ(tb6612_open(&motor, &config, &culprit), 0);
+  tb6612_close(&motor);
+  --config.period_ns;
+  EXPECT_EQ(tb6612_open(&motor, &config, &culprit), -EINVAL);
+  EXPECT_STREQ(culprit, "pwm");
+}
+
 TEST(Mc33926Fault, HealthyBridgesDoNotTripAtAnyDuty) {
   // SF of a healthy bridge is low whenever the sample falls into a coast phase: 1 h at 200 Hz per duty.
   std::mt19937 random(1);

@@ -2,7 +2,9 @@
 
 #include <errno.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "testbed.hpp"
@@ -106,6 +108,9 @@ TEST_F(DmpTest, FirmwareFileMustHaveTheExactSize) {
   EXPECT_EQ(dmp_read_firmware(writeFile("short", image.substr(1)).c_str(), out), -ENODATA);
   EXPECT_EQ(dmp_read_firmware(writeFile("empty", "").c_str(), out), -ENODATA);
   EXPECT_EQ(dmp_read_firmware("/nonexistent/dmp.bin", out), -ENOENT);
+  EXPECT_EQ(dmp_read_firmware("/tmp", out), -EISDIR);
+  const NoStdin none;
+  EXPECT_EQ(dmp_read_firmware(writeFile("good", image).c_str(), out), 0);
 }
 
 TEST_F(DmpTest, LoadsTheImageAndStartsIt) {
@@ -122,6 +127,42 @@ TEST_F(DmpTest, LoadsTheImageAndStartsIt) {
   EXPECT_EQ(imu.dmpMemory(512 + 22), 0);      // 200 / 200 - 1
   EXPECT_EQ(imu.dmpMemory(512 + 23), 0);
   EXPECT_EQ(imu.dmpMemory(DMP_FIRMWARE_BYTES - 1), firmware.back());
+}
+
+// The published settings of the 6-axis quaternion at 200 Hz with gesture word, by the names of the vendor's
+// driver; a wrong byte is another programme.
+TEST_F(DmpTest, EverySettingStandsWhereTheImageHasItAndNowhereElse) {
+  const std::map<uint16_t, std::vector<uint8_t>> settings = {
+      {1062, {0x4C, 0xCD, 0x6C}},                                                        // FCFG_1
+      {1066, {0x0C, 0xC9, 0x2C}},                                                        // FCFG_2
+      {1073, {0x26, 0x46, 0x66}},                                                        // FCFG_7
+      {1088, {0x36, 0x56, 0x76}},                                                        // FCFG_3
+      {104, {0x02, 0xCA, 0xE3, 0x09}},                                                   // D_0_104
+      {2727, {0xA3, 0xA3, 0xA3, 0xA3, 0xA3, 0xA3, 0xA3, 0xA3, 0xA3, 0xA3}},              // CFG_15
+      {2742, {0x20}},                                                                    // CFG_27
+      {1208, {0xB8, 0xAA, 0xB3, 0x8D, 0xB4, 0x98, 0x0D, 0x35, 0x5D}},                    // CFG_MOTION_BIAS
+      {2224, {0xF8}},                                                                    // CFG_20
+      {1853, {0xD8}},                                                                    // CFG_ORIENT_INT
+      {2712, {0x8B, 0x8B, 0x8B, 0x8B}},                                                  // CFG_LP_QUAT
+      {2718, {0x20, 0x28, 0x30, 0x38}},                                                  // CFG_8
+      {534, {0x00, 0x00}},                                                               // D_0_22
+      {2753, {0xFE, 0xF2, 0xAB, 0xC4, 0xAA, 0xF1, 0xDF, 0xDF, 0xBB, 0xAF, 0xDF, 0xDF}},  // CFG_6
+      {2690, {0xD8, 0xB1, 0xB9, 0xF3, 0x8B, 0xA3, 0x91, 0xB6, 0x09, 0xB4, 0xD9}},        // CFG_FIFO_ON_EVENT
+  };
+  start();
+  std::vector<uint8_t> expected = firmwareBytes();
+  for (const auto& [address, bytes] : settings)
+    std::copy(bytes.begin(), bytes.end(), expected.begin() + address);
+  for (uint16_t i = 0; i < DMP_FIRMWARE_BYTES; ++i) ASSERT_EQ(imu.dmpMemory(i), expected[i]) << i;
+}
+
+TEST_F(DmpTest, IsQuietWhileItIsLoaded) {
+  start();
+  const std::vector<std::array<uint8_t, 2>> writes = imu.writes();
+  ASSERT_GE(writes.size(), 4u);
+  EXPECT_EQ(writes[0], (std::array<uint8_t, 2>{0x38, 0x00}));  // no interrupt
+  EXPECT_EQ(writes[1], (std::array<uint8_t, 2>{0x23, 0x00}));  // nothing into the FIFO
+  EXPECT_EQ(writes[2], (std::array<uint8_t, 2>{0x6A, 0x00}));  // and nobody there to take it
 }
 
 TEST_F(DmpTest, ReportsMemoryThatReadsBackWrong) {

@@ -18,6 +18,7 @@ TEST(Libgpiod, AMissingChipIsNoDevice) {
   EXPECT_EQ(gpio_open_input(&line, &pin), -ENODEV);
   EXPECT_EQ(gpio_open_edge(&line, &pin, GPIO_FALLING), -ENODEV);
   gpio_close(&line);
+  EXPECT_EQ(line.fd, -1);
 }
 
 TEST(Libgpiod, WaitingReturnsByTheDeadlineWithoutAnEdge) {

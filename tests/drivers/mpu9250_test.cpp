@@ -2,6 +2,8 @@
 
 #include <errno.h>
 
+#include <initializer_list>
+
 #include "testbed.hpp"
 
 namespace {
@@ -29,6 +31,64 @@ TEST_F(Mpu9250Test, ConfiguresRangesRateFilterAndInterrupt) {
   EXPECT_EQ(imu.reg(0x38), 0x01);
   EXPECT_EQ(imu.writes().front(), (std::array<uint8_t, 2>{0x6B, 0x80}));  // reset first
   EXPECT_FALSE(chip_.variant);
+}
+
+TEST_F(Mpu9250Test, TakesEveryRateAndRangeOfTheChipAndNoOther) {
+  const auto opened = [&](auto&& change) {
+    mpu9250_config_t config = kConfig;
+    change(config);
+    const int status = mpu9250_open(&chip_, &config);
+    mpu9250_close(&chip_);
+    return status;
+  };
+  for (const uint16_t rate : std::initializer_list<uint16_t>{4, 5, 500, 1000})
+    EXPECT_EQ(opened([&](auto& c) { c.rate_hz = rate; }), 0) << rate;
+  for (const uint16_t rate : std::initializer_list<uint16_t>{0, 2, 3, 1001, 2000})
+    EXPECT_EQ(opened([&](auto& c) { c.rate_hz = rate; }), -EINVAL) << rate;
+  for (const uint16_t range : std::initializer_list<uint16_t>{250, 500, 1000, 2000})
+    EXPECT_EQ(opened([&](auto& c) { c.gyro_range_dps = range; }), 0) << range;
+  for (const uint16_t range : std::initializer_list<uint16_t>{0, 125, 251, 4000})
+    EXPECT_EQ(opened([&](auto& c) { c.gyro_range_dps = range; }), -EINVAL) << range;
+  for (const uint8_t range : std::initializer_list<uint8_t>{2, 4, 8, 16})
+    EXPECT_EQ(opened([&](auto& c) { c.accel_range_g = range; }), 0) << int{range};
+  for (const uint8_t range : std::initializer_list<uint8_t>{0, 1, 3, 32})
+    EXPECT_EQ(opened([&](auto& c) { c.accel_range_g = range; }), -EINVAL) << int{range};
+  for (const uint8_t dlpf : std::initializer_list<uint8_t>{1, 6})
+    EXPECT_EQ(opened([&](auto& c) { c.dlpf = dlpf; }), 0) << int{dlpf};
+  for (const uint8_t dlpf : std::initializer_list<uint8_t>{0, 7})
+    EXPECT_EQ(opened([&](auto& c) { c.dlpf = dlpf; }), -EINVAL) << int{dlpf};
+}
+
+TEST_F(Mpu9250Test, LeavesNoDescriptorOpenWhetherItOpensOrNot) {
+  ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);  // the emulated bus opens what it keeps
+  mpu9250_close(&chip_);
+  const int before = openDescriptors();
+  ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);
+  mpu9250_close(&chip_);
+  EXPECT_EQ(openDescriptors(), before);
+  imu.setWhoAmI(0x68);
+  EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -ENODEV);
+  EXPECT_EQ(openDescriptors(), before);
+  plain_i2c = false;
+  EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -EOPNOTSUPP);
+  EXPECT_EQ(openDescriptors(), before);
+  plain_i2c = true;
+  imu.setWhoAmI(0x71);
+  const NoStdin none;
+  ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);
+  EXPECT_EQ(chip_.i2c.fd, 0);
+  mpu9250_close(&chip_);
+}
+
+TEST_F(Mpu9250Test, TheFirstSampleIsNeverARepetition) {
+  for (const int16_t value : {int16_t{0}, int16_t{0x0101}}) {
+    ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);
+    imu.setSample({value, value, value}, {value, value, value});
+    mpu9250_sample_t sample{};
+    ASSERT_EQ(mpu9250_read(&chip_, &sample), 0);
+    EXPECT_EQ(sample.flags & MPU9250_STUCK, 0) << value;
+    mpu9250_close(&chip_);
+  }
 }
 
 TEST_F(Mpu9250Test, AcceptsRelativesWithAWarningAndRefusesStrangers) {

@@ -57,6 +57,30 @@ TEST_F(SerialTest, PassesEveryByteUnchangedBothWays) {
   EXPECT_EQ(std::string(back, back + 256), std::string(all, all + 256));
 }
 
+TEST_F(SerialTest, DescriptorZeroIsOneLikeAnyOther) {
+  const NoStdin none;
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
+  EXPECT_EQ(serial_.fd, 0);
+  EXPECT_EQ(serial_write(&serial_, reinterpret_cast<const uint8_t*>("x"), 1), 1);
+  serial_close(&serial_);
+  EXPECT_EQ(serial_.fd, -1);
+}
+
+TEST_F(SerialTest, KnowsEveryRateThatItOffers) {
+  const std::pair<uint32_t, speed_t> rates[] = {{1200, B1200},   {2400, B2400},    {4800, B4800},
+                                                {9600, B9600},   {19200, B19200},  {38400, B38400},
+                                                {57600, B57600}, {115200, B115200}};
+  for (const auto& [baud, speed] : rates) {
+    ASSERT_EQ(serial_open(&serial_, path_.c_str(), baud), 0) << baud;
+    termios settings;
+    ASSERT_EQ(tcgetattr(serial_.fd, &settings), 0);
+    EXPECT_EQ(cfgetispeed(&settings), speed) << baud;
+    EXPECT_EQ(settings.c_cc[VMIN], 1);
+    EXPECT_EQ(settings.c_cc[VTIME], 0);
+    serial_close(&serial_);
+  }
+}
+
 TEST_F(SerialTest, NothingThereIsNotTheEnd) {
   ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
   uint8_t byte;

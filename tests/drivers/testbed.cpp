@@ -1,8 +1,10 @@
 #include "testbed.hpp"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <linux/i2c-dev.h>
 #include <linux/i2c.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -187,4 +189,20 @@ gboolean Testbed::onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpoin
   const long result = failure != 0 ? -1 : static_cast<long>(count) - (is_short ? 1 : 0);
   umockdev_ioctl_client_complete(client, result, failure);
   return TRUE;
+}
+
+NoStdin::NoStdin() : kept_(fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 100)) { close(STDIN_FILENO); }
+
+NoStdin::~NoStdin() {
+  dup2(kept_, STDIN_FILENO);
+  close(kept_);
+}
+
+int openDescriptors() {
+  int count = 0;
+  for (int fd = 0; fd < 1024; ++fd) {
+    struct stat status {};
+    count += fstat(fd, &status) == 0 && !S_ISSOCK(status.st_mode) ? 1 : 0;
+  }
+  return count;
 }

@@ -45,14 +45,6 @@ std::string readLine(const std::string& path) {
   return line;
 }
 
-bbb_pin_t pinOf(const char* chip, uint32_t line, bool active_low = false) {
-  bbb_pin_t out{};
-  out.used = true;
-  snprintf(out.chip, sizeof out.chip, "%s", chip);
-  out.line = line;
-  out.active_low = active_low;
-  return out;
-}
 // Channels that a killed process of an earlier test left exported.
 void unexportAll() {
   for (const char* device : {"48302200", "48304200"}) {
@@ -62,6 +54,15 @@ void unexportAll() {
   }
 }
 }  // namespace
+
+bbb_pin_t pinOf(const char* chip, uint32_t line, bool active_low) {
+  bbb_pin_t out{};
+  out.used = true;
+  snprintf(out.chip, sizeof out.chip, "%s", chip);
+  out.line = line;
+  out.active_low = active_low;
+  return out;
+}
 
 Bench::Bench() {
   unexportAll();

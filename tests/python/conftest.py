@@ -29,3 +29,40 @@ def known_log(tmp_path_factory) -> Path:
     from synthetic import write_log
 
     return write_log(tmp_path_factory.mktemp("log") / "known.lcm")
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Debian's Chromium, without a window."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="tools/requirements-optional.txt")
+    from equipoise_tools.cockpit.measure import CHROMIUM, CHROMIUM_ARGUMENTS
+
+    if not Path(CHROMIUM).exists():
+        pytest.skip(f"no {CHROMIUM}: apt-get install chromium")
+    with playwright.sync_playwright() as p:
+        chromium = p.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="session")
+def multicast():
+    """Robots that a cockpit drives talk by it."""
+    from equipoise_tools.cockpit.robot import private_url
+    from equipoise_tools.paths import UserError
+    from equipoise_tools.view import open_source
+
+    try:
+        open_source(private_url())
+    except UserError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="module")
+def cockpit(root, logs, multicast):
+    """With the module's folder of logs."""
+    from started_cockpit import Started
+
+    started = Started(root, logs)
+    yield started
+    started.end()

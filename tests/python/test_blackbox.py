@@ -2,20 +2,17 @@
 
 import csv
 import json
-import random
 import re
-import signal
-import socket
 import struct
 import subprocess
-import time
 
 import equipoise
 import mcap.reader
 import numpy as np
 import pytest
+from equipoise_robot.log import read_log
 from equipoise_tools.lockstep_client import Robot
-from equipoise_tools.log import read_log
+from started_lockstep import start_lockstep
 
 SCENARIOS = [
     (estimator, controller, fidelity)
@@ -33,10 +30,10 @@ def equipoise_run(root, *arguments):
     )
 
 
-def simulate(root, log, *arguments, seconds=6):
+def simulate(root, log, *arguments, seconds=6, config=None):
     common = [
         "--config",
-        root / "config/mbbr.toml",
+        config or root / "config/mbbr.toml",
         "--telemetry",
         "off",
         "--log",
@@ -117,7 +114,7 @@ def test_a_changed_sensor_shows_in_the_estimate_of_its_tick(root, tmp_path):
     assert difference["field"].startswith("EQUIPOISE_STATE.")
 
 
-def test_another_filter_is_tried_on_the_same_flight(root, tmp_path):
+def test_another_filter_is_tried_on_the_same_run(root, tmp_path):
     compared = tmp_path / "compared.json"
     log = simulate(
         root, tmp_path / "run.lcm", "--yaw-hz", "0.75", "--compare", "--json", compared, seconds=20
@@ -127,7 +124,7 @@ def test_another_filter_is_tried_on_the_same_flight(root, tmp_path):
     simulated = json.loads(compared.read_text())["estimators"]
     for name in ("ekf", "ekf13_published"):
         assert result["errors"][name]["attitude_rmse_rad"] == pytest.approx(
-            simulated[name]["attitude_rmse_rad"], rel=1e-3
+            simulated[name]["attitude_rmse_rad"], rel=1e-9
         )
     assert (
         result["errors"]["ekf"]["attitude_rmse_rad"]
@@ -157,59 +154,6 @@ def test_what_is_no_log_is_refused(root, tmp_path):
         ended = equipoise_run(root, "replay", path)
         assert ended.returncode == 2
         assert ended.stderr.startswith(f"equipoise: {path}: ") and ended.stderr.count("\n") == 1
-
-
-def start_lockstep(root, tmp_path, *arguments):
-    path = tmp_path / "io.sock"
-    command = [
-        root / "build/host/equipoise",
-        "run",
-        "--config",
-        root / "config/mbbr.toml",
-        "--telemetry",
-        "off",
-    ]
-    command += ["--backend", "lockstep", "--socket", path, "--log", tmp_path / "run.lcm"]
-    process = subprocess.Popen(list(map(str, [*command, *arguments])), stderr=subprocess.DEVNULL)
-    connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    connection.settimeout(30)
-    while True:
-        try:
-            connection.connect(str(path))
-            return process, connection
-        except (FileNotFoundError, ConnectionRefusedError):
-            assert process.poll() is None
-            time.sleep(0.005)
-
-
-@pytest.mark.slow
-def test_sigkill_at_any_time_leaves_a_readable_log_that_lost_less_than_100_ms(root, tmp_path):
-    """200 kills of a robot in real time. Lost: between the last answered step and the log's end."""
-    chance = random.Random(6)
-    lost_ms = []
-    message = Robot(0.0).sensors(0)
-    for kill in range(200):
-        folder = tmp_path / str(kill)
-        folder.mkdir()
-        process, connection = start_lockstep(root, folder)
-        steps = chance.randrange(1, 40)
-        with connection:
-            started = time.monotonic()
-            for step in range(steps):
-                message.step, message.t_s = step, 0.005 * step
-                connection.send(message.encode())
-                connection.recv(512)
-                time.sleep(max(0.0, started + 0.005 * (step + 1) - time.monotonic()))
-            time.sleep(chance.random() * 0.004)
-            process.send_signal(signal.SIGKILL)
-            process.wait()
-        log = read_log(folder / "run.lcm")
-        whole = len(log["EQUIPOISE_TIMING"]) if "EQUIPOISE_TIMING" in log else 0
-        assert "EQUIPOISE_RUN" in log
-        lost_ms.append(5.0 * (steps - whole))
-    assert len(lost_ms) == 200
-    assert max(lost_ms) <= 100.0, sorted(lost_ms)[-10:]
-    print(f"200 kills: at most {max(lost_ms):.0f} ms lost, mean {np.mean(lost_ms):.1f} ms")
 
 
 def test_a_large_log_goes_on_in_further_files_and_replays_as_one(root, tmp_path):
@@ -308,10 +252,10 @@ def compared_log(root, tmp_path_factory):
     return log
 
 
-def columns_of(log):
+def columns_of(log, without=("EQUIPOISE_TIMING_HISTOGRAM",)):
     columns = {}
     for channel, records in read_log(log).items():
-        if records.dtype.names and channel != "EQUIPOISE_TIMING_HISTOGRAM":
+        if records.dtype.names and channel not in without:
             columns |= dict(flat(channel.removeprefix("EQUIPOISE_").lower(), records))
     return columns
 
@@ -320,7 +264,8 @@ def test_csv_holds_every_number_of_the_log(root, tmp_path, compared_log):
     out = tmp_path / "run.csv"
     assert equipoise_run(root, "convert", compared_log, "--to", "csv", "--out", out).returncode == 0
     rows = list(csv.DictReader(out.open()))
-    expected = columns_of(compared_log)
+    once = ("EQUIPOISE_TIMING_HISTOGRAM", "EQUIPOISE_VERDICT")
+    expected = columns_of(compared_log, without=once)
     assert [int(row["tick"]) for row in rows] == list(range(400))
     assert set(rows[0]) == {"t_s", "tick", *expected}
     assert {"timing.compute_ns", "state_ekf13.theta_rad_0", "sensors.imu_temperature_degC"} < set(expected)
@@ -341,7 +286,9 @@ def test_mcap_holds_every_number_of_the_log(root, tmp_path, compared_log):
             assert message.log_time == 1000 * utime[fields.pop("tick")]
             for field, value in fields.items():
                 found[f"{channel.topic.removeprefix('equipoise/')}.{field}"].append(value)
-    assert found == {column: values.tolist() for column, values in expected.items()}
+    shown = {column: [None if v != v else v for v in values.tolist()] for column, values in expected.items()}
+    assert len(shown["verdict.ended"]) == 1
+    assert found == shown
 
 
 def test_mcap_can_be_sought_in(root, tmp_path, compared_log):

@@ -7,7 +7,14 @@ import subprocess
 import numpy as np
 import pytest
 from equipoise_tools import campaign, campaign_page
-from equipoise_tools.campaign_statistics import influences, ranks, separation, survival_over_time, wilson
+from equipoise_tools.campaign_statistics import (
+    influences,
+    quantile_interval,
+    ranks,
+    separation,
+    survival_over_time,
+    wilson,
+)
 
 SETTINGS = {
     "config": "config/mbbr.toml",
@@ -40,6 +47,24 @@ def test_wilson_is_the_textbook_interval():
     assert wilson(10, 10) == pytest.approx((0.7225, 1.0), abs=1e-4)
     assert wilson(50, 100) == pytest.approx((0.4038, 0.5962), abs=1e-4)
     assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_quantiles_lie_in_their_interval_as_often_as_it_says():
+    rng = np.random.default_rng(1)
+    for share, true in ((0.5, 0.0), (0.95, 1.6448536)):
+        held = 0
+        for _ in range(1000):
+            _, low, high = quantile_interval(rng.normal(size=200), share)
+            held += low <= true <= high
+        assert 930 <= held <= 990  # of 950 wanted: ranks are whole numbers
+
+
+def test_errors_are_those_of_the_upright():
+    rows = [{**row(r, r > 4), "heading_error_rad": -0.1 * r} for r in range(1, 8)]
+    table = campaign_page.error_table(rows)
+    assert "| 1 | 0.2 | attitude RMSE, rad | 0.0025 (0.0010 - 0.0040) | 0.0038 (0.0030 - 0.0040) |" in table
+    assert any("heading error at the end, rad | 0.250" in line for line in table)
+    assert not any("position" in line for line in table)  # not measured
 
 
 def test_separation_is_the_share_of_pairs():

@@ -11,8 +11,8 @@ import pytest
 
 def test_only_the_holder_of_the_key_commands_the_robot(root, tmp_path):
 
-    environment = {**os.environ, "PYTHONPATH": f"{root}/tools:{root}/build/host/lcm/python"}
-    command = [root / "tools/lib/multicast", sys.executable, root / "tests/python/command_flight.py"]
+    environment = {**os.environ, "PYTHONPATH": f"{root}/tools:{root}/python:{root}/build/host/lcm/python"}
+    command = [root / "tools/lib/multicast", sys.executable, root / "tests/python/command_run.py"]
     command += [root / "build/host/equipoise", root / "config/mbbr.toml", tmp_path]
     ended = subprocess.run(
         command,

@@ -87,26 +87,38 @@ def shortfalls(design):
                     yield f"{row['yaw_hz']} Hz, {place}: {name} {m[name]:.2f}"
 
 
-# Weighed together with the filter's noise for margin at u, gyro and encoders; docs/derivation.md.
-MARGIN = [
-    "--set=controller.scheduled.design.theta_rad=0.02",
-    "--set=controller.scheduled.design.phi_rad=3.7",
-    "--set=controller.scheduled.design.body_rate_rad_s=0.35",
-    "--set=controller.scheduled.design.phi_dot_rad_s=1000.0",
-    "--set=estimator.ekf.input_variance=[0.035,0.035,0.035]",
-    "--set=estimator.ekf.r=[2.08e-6,2.08e-6,2.08e-6,1e-3,1e-3,1e-3,1.41,1.41]",
-]
+def test_the_shipped_design_has_every_margin_at_every_yaw_rate(root):
+    assert list(shortfalls(design(root, "mbbr"))) == []
 
 
-def test_the_margin_weights_reach_every_margin_at_every_yaw_rate(root):
-    assert list(shortfalls(design(root, "mbbr", *MARGIN))) == []
+@pytest.mark.parametrize(
+    ("setting", "missed"),
+    [
+        ("controller.scheduled.design.phi_dot_rad_s=5.0", "encoder: gain_up_dB"),
+        ("controller.scheduled.design.body_rate_rad_s=0.2", "gyro: phase_deg"),
+        ("estimator.ekf.r=[2.08e-6,2.08e-6,2.08e-6,7.9e-5,7.9e-5,7.9e-5,1.41,1.41]", "encoder: gain_up_dB"),
+        ("chain.actuation_delay_s=0.0049", "u: gain_up_dB"),
+    ],
+)
+def test_margins_tell_a_bad_weight_a_bad_filter_and_a_late_chain(root, setting, missed):
+    assert any(missed in s for s in shortfalls(design(root, "mbbr", f"--set={setting}")))
 
 
-def test_margins_tell_a_bad_weight_and_a_late_chain(root):
-    weight = "--set=controller.scheduled.design.phi_dot_rad_s=5.0"
-    assert any("encoder" in s for s in shortfalls(design(root, "mbbr", *MARGIN, weight)))
-    late = "--set=chain.actuation_delay_s=0.0049"
-    assert any("delay_ms" in s or "gain_up" in s for s in shortfalls(design(root, "mbbr", *MARGIN, late)))
+def test_gains_poles_and_margins_are_printed(root):
+    command = [
+        root / "build/host/equipoise",
+        "design",
+        "--config",
+        root / "config/mbbr.toml",
+        "--step-hz",
+        "3",
+    ]
+    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    for word in ("K  ", "poles", "gain, dB", "phase, deg", "further delay"):
+        assert word in text
+    row = design(root, "mbbr", "--last-hz", "0")["rows"][0]
+    assert f"{row['lqr']['K'][0][0]:.5g}" in text
+    assert f"{row['lqr']['poles'][0][0]:.5g}" in text
 
 
 @pytest.mark.parametrize("controller", ["slc", "lqr"])
@@ -134,4 +146,4 @@ def test_an_unknown_choice_is_refused(root):
     command = [root / "build/host/equipoise", "design", "--config", root / "config/mbbr.toml"]
     run = subprocess.run([*command, "--controller", "slc"], capture_output=True, text=True, check=False)
     assert run.returncode == 2
-    assert "thesis, scheduled" in run.stderr
+    assert "scheduled, thesis" in run.stderr

@@ -36,11 +36,11 @@ def test_motor_parameters_come_back_and_a_configuration_includes_them(brake_log,
     text = fragment.read_text()
     assert "# inductance_H: the data do not determine it" in text
     include = f'include=["{fragment}"]'
-    flight = run("sim", "--config", "config/mbbr.toml", "--set", include, "--duration-s", 0.1, "--log",
+    simulated = run("sim", "--config", "config/mbbr.toml", "--set", include, "--duration-s", 0.1, "--log",
                  tmp_path / "a.lcm", "--telemetry", "off", "--json", "-", status=0)  # fmt: skip
     plain = run("sim", "--config", "config/mbbr.toml", "--duration-s", 0.1, "--log",
                 tmp_path / "b.lcm", "--telemetry", "off", "--json", "-", status=0)  # fmt: skip
-    sha = [json.loads(each.stdout)["config_sha256"] for each in (flight, plain)]
+    sha = [json.loads(each.stdout)["config_sha256"] for each in (simulated, plain)]
     assert sha[0] != sha[1]
 
 
@@ -115,6 +115,19 @@ def test_friction_comes_back_within_two_percent(tmp_path):
         assert found["estimates"][name]["value"] == pytest.approx(true, rel=0.02)
         assert found["estimates"][name]["determined"]
     assert "[robot]\ncoulomb_friction_N_m = 0.05" in fragment.read_text()
+
+
+@pytest.mark.parametrize("ratio", [None, 0.8])
+def test_rig_and_identification_agree_without_a_word(tmp_path, ratio):
+    log = tmp_path / "rig.lcm"
+    run("friction-rig", "--log", log, *([] if ratio is None else ["--radius-ratio", ratio]))
+    found = json.loads(run("identify", "friction", log, "--json", "-").stdout)["estimates"]
+    assert found["viscous_friction_N_m_s"]["value"] == pytest.approx(0.001056, rel=0.05)
+
+
+def test_a_log_that_does_not_say_the_ratio_asks_for_it(tmp_path):
+    log = csv_of(tmp_path / "rig.csv", [(0.005 * i, 0.5, "nan", "nan", 0.01 * i) for i in range(400)])
+    assert "--radius-ratio" in run("identify", "friction", log, status=2).stderr
 
 
 def test_a_short_sweep_says_what_it_cannot_tell(tmp_path):

@@ -7,8 +7,8 @@ import sys
 import equipoise
 import numpy as np
 import pytest
-from equipoise_tools.lcm_types import message_types
-from equipoise_tools.log import read_log
+from equipoise_robot.lcm_types import message_types
+from equipoise_robot.log import read_log
 from equipoise_tools.paths import UserError
 
 import lcm
@@ -113,7 +113,7 @@ def test_memory_does_not_grow_with_the_log(tmp_path):
             for _ in range(times):
                 file.write(data)
         program = (
-            "import resource, sys; from equipoise_tools.log import read_log; log = read_log(sys.argv[1]);"
+            "import resource, sys; from equipoise_robot.log import read_log; log = read_log(sys.argv[1]);"
             "print(log['EQUIPOISE_STATE'].size, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
         )
         ran = subprocess.run(

@@ -20,6 +20,7 @@ def enumerators(text: str, enum: str) -> list[tuple[str, int]]:
         ("include/equipoise/actuate/safety.hpp", "ArmState", names.ARM_STATES),
         ("include/equipoise/actuate/safety_reasons.hpp", "SafetyReason", names.SAFETY_REASONS),
         ("include/equipoise/sample.h", "rio_health", names.SENSOR_HEALTH),
+        ("include/equipoise/actuate/degraded.hpp", "DegradedBit", names.DEGRADED),
     ],
 )
 def test_words_follow_the_headers(root, header, enum, words):

@@ -11,8 +11,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 import synthetic
+from equipoise_robot.log import read_log
 from equipoise_tools import names, report
-from equipoise_tools.log import read_log
 from equipoise_tools.metrics import outcome, summarise
 
 

@@ -52,6 +52,22 @@ def test_other_robots_balance_turn_and_drive(root, table_5_2, draw):
         assert not result["fell"], f"mass, height, wheel {size}: {result}"
 
 
+@pytest.mark.parametrize(
+    ("setting", "named"),
+    [
+        ("robot.com_height_m=1.0", "robot.com_height_m: implausible"),
+        ("robot.k1_N_m=0.02", "robot.k1_N_m: implausible"),
+        ("robot.ball_inertia_kg_m2=8.46e-3", "robot.ball_inertia_kg_m2: implausible"),
+        ("controller.scheduled.design.theta_rad=0.0005", "controller.scheduled.design: implausible"),
+    ],
+)
+def test_a_design_without_margin_is_refused_and_named(root, setting, named):
+    command = [root / "build/host/equipoise", "sim", "--config", root / "config/mbbr.toml", "--set", setting]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert named in run.stderr
+
+
 def test_a_ball_bot_of_kugles_size_balances_and_drives(root):
     for motion in ([], ["--drive-mps", "0.3"], ["--yaw-hz", "0.25", "--drive-mps", "0.2"]):
         for seed in range(1, 6):

@@ -8,7 +8,7 @@ import subprocess
 import time
 
 import pytest
-from equipoise_tools.log import read_log
+from equipoise_robot.log import read_log
 from equipoise_tools.metrics import summarise
 
 
@@ -134,16 +134,16 @@ def test_an_interrupted_run_still_leaves_its_report(root, run_command):
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
     )
 
-    def flying():
+    def running():
         return [log for log in logged() - before if log.stat().st_size > 0]
 
-    while process.poll() is None and not flying():
+    while process.poll() is None and not running():
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)  # as the terminal does on Ctrl-C
     out, err = process.communicate()
     assert process.returncode == 0, err
     assert b"report.html" in out
-    (log,) = flying()
+    (log,) = running()
     assert json.loads((log.parent / "summary.json").read_text())["interrupted"]
     assert (log.parent / "report.png").exists()
 

@@ -56,7 +56,6 @@ Recorded record(const std::string& path, FaultKind fault, app::Phase phase, std:
     };
     (void)app::run_with_fault(world, pipeline, plan, seed, keep);
   });
-  telemetry.finish();
   return out;
 }
 
@@ -79,7 +78,7 @@ TYPED_TEST(FaultReplay, IsBitExactWhereTheRuntimeIntervened) {
         EXPECT_NE(recorded.inhibit, 0U) << "the runtime did not intervene";
       }
       app::RunLog log(path);
-      const app::Replay replay = app::replay_as<TypeParam>(log, path, "");
+      const app::Replay replay = app::replay_as<TypeParam>(log, path);
       EXPECT_GE(replay.ticks, 780);
       EXPECT_TRUE(replay.identical()) << "tick " << replay.difference.tick << " " << replay.difference.field;
     }

@@ -7,9 +7,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstddef>
 #include <memory>
-#include <vector>
+#include <string>
 
 #include "allocation_watch.hpp"
 #include "closed_loop.hpp"
@@ -17,23 +18,13 @@
 namespace equipoise {
 namespace {
 
+template <class Firmware>
 Command spinning() {
   Command command = ClosedLoop::armed();
   command.yaw_rate_rad_s = 2.0 * kPi;
-  command.velocity_W_m_s = Vec2(0.1, 0.0);
+  command.velocity_W_m_s = 0.1 * Vec2(std::cos(Firmware::kForward_rad), std::sin(Firmware::kForward_rad));
   return command;
 }
-
-class Tick : public ::testing::TestWithParam<int> {
- protected:
-  /// Every estimator runs beside the controlling one.
-  ClosedLoopOptions options() const {
-    ClosedLoopOptions o;
-    o.estimator = static_cast<MbbrEstimatorId>(GetParam());
-    o.compare = true;
-    return o;
-  }
-};
 
 /// Keeps the compiler from leaving out an allocation that nobody looks at.
 template <class Pointer>
@@ -57,27 +48,34 @@ TEST(AllocationWatchTest, SeesWhatTheTickMustNotDo) {
   EXPECT_EQ(watch.count(), 5);
 }
 
-/// Balances, spins and drives, fails, arms again.
-template <class Loop>
-void exercise(Loop& loop) {
-  loop.balance(1.0);
-  loop.run(2.0, spinning());
-  loop.step(spinning(), [](RawSample& raw, Command&) { raw.gyro_counts[0] = NAN; });
+/// Balances, spins and drives, fails, arms again. True: its motors ran.
+template <class Firmware, class Loop>
+bool exercise(Loop& loop) {
+  const bool ran = loop.balance(0.1).motors.enable;
+  loop.run(0.9, ClosedLoop::armed());
+  loop.run(2.0, spinning<Firmware>());
+  loop.step(spinning<Firmware>(), [](RawSample& raw, Command&) { raw.gyro_counts[0] = NAN; });
   loop.run(0.05, Command{});
   loop.run(0.5, ClosedLoop::armed());
+  return ran;
 }
 
-template <class Pipeline>
-std::int64_t allocations_of(const ClosedLoopOptions& options) {
-  ClosedLoopWith<Pipeline> loop(options);
+/// Every estimator runs beside the controlling one.
+ClosedLoopOptions controlled_by(const std::string& estimator) {
+  ClosedLoopOptions options;
+  options.estimator = estimator;
+  options.compare = true;
+  return options;
+}
+
+template <class Firmware, class Pipeline>
+std::int64_t allocations_of(const std::string& estimator) {
+  ClosedLoopWith<Pipeline, Firmware> loop(controlled_by(estimator));
   const AllocationWatch watch;
-  exercise(loop);
-  return watch.count();
-}
-
-TEST_P(Tick, AllocatesNothing) {
-  EXPECT_EQ(allocations_of<MbbrScheduledPipeline>(options()), 0);
-  EXPECT_EQ(allocations_of<MbbrThesisPipeline>(options()), 0);
+  const bool ran = exercise<Firmware>(loop);
+  const std::int64_t count = watch.count();
+  EXPECT_TRUE(ran);
+  return count;
 }
 
 /// From here on any system call but exit_group kills the process.
@@ -114,21 +112,47 @@ TEST(SystemCallFilter, CatchesOne) {
   EXPECT_TRUE(WIFSIGNALED(status));
 }
 
-TEST_P(Tick, MakesNoSystemCall) {
-  ClosedLoop scheduled(options());
-  ClosedLoopWith<MbbrThesisPipeline> thesis(options());
-  const int status = status_without_system_calls([&] {
-    exercise(scheduled);
-    exercise(thesis);
+/// How a child ends that lets two pipelines of a robot fly.
+template <class Firmware, class First, class Second>
+int status_of_flights(const std::string& estimator) {
+  ClosedLoopWith<First, Firmware> first(controlled_by(estimator));
+  ClosedLoopWith<Second, Firmware> second(controlled_by(estimator));
+  return status_without_system_calls([&] {
+    (void)exercise<Firmware>(first);
+    (void)exercise<Firmware>(second);
   });
+}
+
+class MbbrTick : public ::testing::TestWithParam<std::string> {};
+class MipTick : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(MbbrTick, AllocatesNothing) {
+  EXPECT_EQ((allocations_of<app::MbbrFirmware, MbbrScheduledPipeline>(GetParam())), 0);
+  EXPECT_EQ((allocations_of<app::MbbrFirmware, MbbrThesisPipeline>(GetParam())), 0);
+}
+
+TEST_P(MipTick, AllocatesNothing) {
+  EXPECT_EQ((allocations_of<app::MipFirmware, MipSlcPipeline>(GetParam())), 0);
+  EXPECT_EQ((allocations_of<app::MipFirmware, MipLqrPipeline>(GetParam())), 0);
+}
+
+TEST_P(MbbrTick, MakesNoSystemCall) {
+  const int status =
+      status_of_flights<app::MbbrFirmware, MbbrScheduledPipeline, MbbrThesisPipeline>(GetParam());
   if (status == -1) GTEST_SKIP() << "no seccomp filters here";
   EXPECT_EQ(status, 0) << "killed by a system call in the tick";
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryEstimator, Tick, ::testing::Range(0, static_cast<int>(MbbrEstimators::kCount)),
-                         [](const auto& test) {
-                           return kMbbrEstimatorNames[static_cast<std::size_t>(test.param)];
-                         });
+TEST_P(MipTick, MakesNoSystemCall) {
+  const int status = status_of_flights<app::MipFirmware, MipSlcPipeline, MipLqrPipeline>(GetParam());
+  if (status == -1) GTEST_SKIP() << "no seccomp filters here";
+  EXPECT_EQ(status, 0) << "killed by a system call in the tick";
+}
+
+std::string named(const ::testing::TestParamInfo<std::string>& test) { return test.param; }
+INSTANTIATE_TEST_SUITE_P(EveryEstimator, MbbrTick, ::testing::ValuesIn(app::MbbrFirmware::estimators()),
+                         named);
+INSTANTIATE_TEST_SUITE_P(EveryEstimator, MipTick, ::testing::ValuesIn(app::MipFirmware::estimators()), named);
 
 }  // namespace
 }  // namespace equipoise

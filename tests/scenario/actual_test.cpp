@@ -34,8 +34,8 @@ app::SimSummary drive(const std::vector<std::string>& overrides, std::uint64_t s
   choice.fidelity = "nominal";
   app::complete<app::MbbrFirmware>(choice);
   app::SimOptions options;
-  options.yaw_rate_rad_s = 2.0 * kPi;
-  options.drive_mps = 0.1;
+  options.script.yaw_rate_rad_s = 2.0 * kPi;
+  options.script.drive_mps = 0.1;
   options.duration_s = 30.0;
   options.seed = seed;
   const std::atomic<bool> stop{false};

@@ -1,5 +1,7 @@
-// Every fault in every phase of flight through the boundary, and a short soak: nothing unsafe.
+// Every fault in every phase of a run through the boundary, and a short soak: nothing is unsafe. And without
+// a fault nothing is found.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -10,33 +12,73 @@
 
 namespace {
 
+/// The JSON of `equipoise campaign`; `status`, where wanted: its exit status.
+nlohmann::json result(const std::string& robot, const std::string& arguments, int* status = nullptr) {
+  const std::string json = ::testing::TempDir() + "campaign-" + robot + ".json";
+  const std::string command = std::string(EQUIPOISE_BINARY) + " campaign --config " +
+                              EQUIPOISE_SOURCE_DIR "/config/" + robot + ".toml " + arguments + " --json " +
+                              json + " > " + json + ".txt";
+  const int raw = std::system(command.c_str());
+  if (status != nullptr) *status = WEXITSTATUS(raw);
+  std::ifstream file(json);
+  nlohmann::json out = nlohmann::json::parse(file);
+  std::filesystem::remove(json);
+  std::filesystem::remove(json + ".txt");
+  return out;
+}
+
 class Campaign : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(Campaign, NoFaultInAnyPhaseIsUnsafe) {
-  const std::string config = std::string(EQUIPOISE_SOURCE_DIR) + "/config/" + GetParam() + ".toml";
-  const std::string json = ::testing::TempDir() + "campaign-" + GetParam() + ".json";
-  const std::string command = std::string(EQUIPOISE_BINARY) + " campaign --config " + config +
-                              " --soak-hours 0.05 --json " + json + " > " + json + ".txt";
-  EXPECT_EQ(std::system(command.c_str()), 0);
-  std::ifstream file(json);
-  const nlohmann::json result = nlohmann::json::parse(file);
-  EXPECT_GE(result["case_count"].get<int>(), 60);
-  EXPECT_EQ(result["unsafe"].get<int>(), 0);
-  EXPECT_EQ(result["soak"]["unsafe"].get<int>(), 0);
-  EXPECT_EQ(result["soak"]["unexplained"].get<int>(), 0);
+  int status = -1;
+  const nlohmann::json all = result(GetParam(), "--soak-hours 0.05", &status);
+  EXPECT_GE(all["case_count"].get<int>(), 60);
+  EXPECT_EQ(status, all["unsafe"].get<int>() == 0 ? 0 : 1);
+  EXPECT_TRUE(all["soak"]["to_explain"].empty()) << all["soak"]["to_explain"].dump();
   std::set<std::string> kinds;
   int disarmed = 0;
-  for (const nlohmann::json& each : result["cases"]) {
+  for (const nlohmann::json& each : all["cases"]) {
+    const auto fault = each["fault"].get<std::string>();
     EXPECT_FALSE(each["unsafe"].get<bool>()) << each.dump();
-    kinds.insert(each["fault"].get<std::string>());
+    kinds.insert(fault);
     disarmed += each["disarmed"].get<bool>() ? 1 : 0;
   }
   EXPECT_GE(kinds.size(), 20U);
   EXPECT_GE(disarmed, 30);  // the faults do reach the firmware
-  std::filesystem::remove(json);
-  std::filesystem::remove(json + ".txt");
+}
+
+/// Attitude packets are not what these robots balance by: to lose them is no fault. 301, 302, 305, 316 and
+/// 327 of the eduMIP have much play in their gears, which was taken for a lying encoder.
+TEST_P(Campaign, ASoundRobotIsNeitherDisarmedNorIsAnythingLeftOut) {
+  const nlohmann::json sound =
+      result(GetParam(), "--fault torn_packet --fidelity full --robot 301 --robots 5");
+  EXPECT_EQ(sound["case_count"].get<int>(), 30);
+  for (const nlohmann::json& each : sound["cases"]) {
+    if (each["phase"] == "disarmed") continue;
+    EXPECT_FALSE(each["disarmed"].get<bool>()) << each.dump();
+    EXPECT_TRUE(each["degraded"].empty()) << each.dump();
+    EXPECT_TRUE(each["upright"].get<bool>()) << each.dump();
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, Campaign, ::testing::Values("mbbr", "edumip"));
+
+/// Robots that were lost before: a stall of 50 ms was followed by a quarrel about the gyro (405, 421, 429,
+/// 442), and a standing eduMIP moved too little to say which of its two encoders stood still.
+TEST(RidesThrough, AStallWhileTurning) {
+  for (const char* robot : {"405", "421", "429", "442"}) {
+    const nlohmann::json ridden = result(
+        "mbbr", std::string("--fidelity full --fault stall_50ms --phase spin_driving --robot ") + robot);
+    ASSERT_EQ(ridden["case_count"].get<int>(), 1);
+    EXPECT_TRUE(ridden["cases"][0]["upright"].get<bool>()) << ridden["cases"][0].dump();
+  }
+}
+
+TEST(RidesThrough, AnEncoderThatStandsStillOnAStandingMip) {
+  const nlohmann::json ridden =
+      result("edumip", "--fidelity full --fault wheel_loss --phase balancing --robot 402 --robots 8");
+  EXPECT_EQ(ridden["case_count"].get<int>(), 8);
+  for (const nlohmann::json& each : ridden["cases"]) EXPECT_TRUE(each["upright"].get<bool>()) << each.dump();
+}
 
 }  // namespace

@@ -11,7 +11,7 @@ const std::string kConfigs = std::string(EQUIPOISE_SOURCE_DIR) + "/config/";
 const std::atomic<bool> kNever{false};
 
 app::SimOptions drive(double yaw_rate_rad_s, double speed_m_s, std::uint64_t seed) {
-  return {yaw_rate_rad_s, speed_m_s, 30.0, seed};
+  return {{true, speed_m_s, yaw_rate_rad_s}, 30.0, seed};
 }
 
 TEST(CrookedLateImu, MbbrSpinsAndDrives) {
@@ -26,11 +26,22 @@ TEST(CrookedLateImu, MbbrSpinsAndDrives) {
       const app::SimSummary s = app::simulate<app::MbbrFirmware>(
           config, choice, drive(2.0 * kPi * yaw_hz, 0.2, seed), nullptr, kNever);
       EXPECT_FALSE(s.verdict.fell()) << yaw_hz << " Hz, seed " << seed;
-      // At 3 Hz the soft sum about z, which radii that are not as configured need, costs 0.007 rad:
-      // docs/filter.md.
-      EXPECT_LT(s.controlling.attitude_rmse_rad, yaw_hz < 2.0 ? 0.006 : 0.013)
-          << yaw_hz << " Hz, seed " << seed;
+      EXPECT_LT(s.controlling.attitude_rmse_rad, 0.006) << yaw_hz << " Hz, seed " << seed;
     }
+  }
+}
+
+TEST(CrookedLateImu, MbbrWithRadiiUnlikeTheConfiguredOnes) {
+  for (const double yaw_hz : {1.0, 3.0}) {
+    const MbbrConfig config =
+        load_mbbr(kConfigs + "mbbr.toml", {"world.nominal.actual.ball_radius_scale=1.02",
+                                           "world.nominal.actual.wheel_radius_scale=0.98"})
+            .config;
+    const app::Choice choice{"ekf", "scheduled", "nominal", false};
+    const app::SimSummary s =
+        app::simulate<app::MbbrFirmware>(config, choice, drive(2.0 * kPi * yaw_hz, 0.2, 1), nullptr, kNever);
+    EXPECT_FALSE(s.verdict.fell()) << yaw_hz << " Hz";
+    EXPECT_LT(s.controlling.attitude_rmse_rad, 0.005) << yaw_hz << " Hz";
   }
 }
 

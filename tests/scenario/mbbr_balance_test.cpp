@@ -11,7 +11,7 @@ using app::SimSummary;
 constexpr int kSeeds = 20;
 const std::string kMbbr = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
 
-struct Flight {
+struct Setting {
   const char* controller = "scheduled";
   double yaw_hz = 0.0;
   double drive_mps = 0.0;
@@ -21,12 +21,12 @@ struct Flight {
   bool compare = false;
 };
 
-SimSummary run(const Flight& o, MbbrEstimatorId estimator, const std::vector<std::string>& set = {}) {
+SimSummary run(const Setting& o, MbbrEstimatorId estimator, const std::vector<std::string>& set = {}) {
   static const std::atomic<bool> never{false};
   const auto name = [](const auto& names, auto value) { return names[static_cast<std::size_t>(value)]; };
   const app::Choice choice{name(kMbbrEstimatorNames, estimator), o.controller,
                            name(kFidelityNames, o.fidelity), o.compare};
-  const app::SimOptions options{2.0 * kPi * o.yaw_hz, o.drive_mps, o.duration_s, o.seed};
+  const app::SimOptions options{{true, o.drive_mps, 2.0 * kPi * o.yaw_hz}, o.duration_s, o.seed};
   return app::simulate<app::MbbrFirmware>(load_mbbr(kMbbr, set).config, choice, options, nullptr, never);
 }
 
@@ -42,7 +42,7 @@ class ThesisController : public testing::TestWithParam<Drive> {};
 
 TEST_P(ThesisController, HoldsTheIdealWorldWithTrueStatesForEverySeed) {
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    Flight o;
+    Setting o;
     o.controller = "thesis";
     o.yaw_hz = GetParam().yaw_hz;
     o.drive_mps = GetParam().drive_mps;
@@ -61,7 +61,7 @@ class KfAttitude : public testing::TestWithParam<Drive> {};
 
 TEST_P(KfAttitude, HoldsTheThesisWorldForEverySeed) {
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    Flight o;
+    Setting o;
     o.controller = "thesis";
     o.yaw_hz = GetParam().yaw_hz;
     o.drive_mps = GetParam().drive_mps;
@@ -79,7 +79,7 @@ class Comparison : public testing::TestWithParam<Drive> {};
 TEST_P(Comparison, CorrectedFiltersBeatThePrintedOneOnTheSameSamples) {
   for (const Fidelity fidelity : {Fidelity::kThesis, Fidelity::kNominal}) {
     for (int seed = 1; seed <= 3; ++seed) {
-      Flight o;
+      Setting o;
       o.yaw_hz = GetParam().yaw_hz;
       o.drive_mps = GetParam().drive_mps;
       o.duration_s = 30.0;
@@ -104,7 +104,7 @@ class Defaults : public testing::TestWithParam<Drive> {};
 
 TEST_P(Defaults, SpinAndDriveInTheFullWorld) {
   for (int seed = 1; seed <= 5; ++seed) {
-    Flight o;
+    Setting o;
     o.yaw_hz = GetParam().yaw_hz;
     o.drive_mps = GetParam().drive_mps;
     o.seed = static_cast<std::uint64_t>(seed);
@@ -119,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(DriveRates, Defaults,
                                          Drive{-1.0, 0.10}, Drive{1.5, 0.05}));
 
 TEST(Simulation, SameSeedGivesTheSameNumbersAndAnotherSeedOthers) {
-  Flight o;
+  Setting o;
   o.yaw_hz = 1.0;
   o.drive_mps = 0.1;
   o.duration_s = 8.0;
@@ -134,7 +134,7 @@ TEST(Simulation, SameSeedGivesTheSameNumbersAndAnotherSeedOthers) {
 
 TEST(Simulation, APrintedSlcSignOrEulerRatesFallWhereOursHold) {
   // physics: the printed minus of (6.13) is unstable under the dissertation's own conventions.
-  Flight o;
+  Setting o;
   o.controller = "thesis";
   o.duration_s = 60.0;
   o.drive_mps = 0.1;
@@ -148,13 +148,13 @@ TEST(Simulation, APrintedSlcSignOrEulerRatesFallWhereOursHold) {
 
 TEST(Simulation, NoiseThroughTheTorquesBeatsADiagonalUnderFriction) {
   // The reason why config/mbbr.toml departs from (6.31) and (6.23).
-  Flight o;
+  Setting o;
   o.controller = "thesis";
   o.drive_mps = 0.2;
   const SimSummary ours = run(o, MbbrEstimatorId::kEkf);
   const SimSummary printed =
       run(o, MbbrEstimatorId::kEkf,
-          {"estimator.ekf.q=[1e-5,1e-5,1e-4,1e-4,1e-4,0.1,0.1,2.0,1e-3,1e-3,1e-10,1e-10,1e-11,1e-11,0,0,0]",
+          {"estimator.ekf.q=[1e-5,1e-5,1e-4,1e-4,1e-4,0.1,0.1,2.0,1e-3,1e-3,1e-10,1e-10,1e-11,1e-11,0,0,0,0]",
            "estimator.ekf.r=[2.08e-6,2.08e-6,2.08e-6,4.99e-4,4.99e-4,4.99e-4,1.41,1.41]",
            "estimator.ekf.input_variance=[0.0,0.0,0.0]"});
   EXPECT_LT(ours.controlling.attitude_rmse_rad, 0.3 * printed.controlling.attitude_rmse_rad);
@@ -162,7 +162,7 @@ TEST(Simulation, NoiseThroughTheTorquesBeatsADiagonalUnderFriction) {
 }
 
 TEST(Simulation, RecoversFromAPush) {
-  Flight o;
+  Setting o;
   o.duration_s = 10.0;
   const std::vector<std::string> push{
       "world.nominal.pushes=[{at_s=5.0, duration_s=0.05, force_N=[4.0, 0.0]}]"};

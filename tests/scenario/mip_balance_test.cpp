@@ -13,7 +13,7 @@ app::SimSummary run(const std::string& controller, double yaw_rate_rad_s, std::u
                     double duration_s, const std::vector<std::string>& set = {}, bool compare = false) {
   static const std::atomic<bool> never{false};
   const app::Choice choice{"ekf", controller, "nominal", compare, "dmp"};
-  const app::SimOptions options{yaw_rate_rad_s, 0.0, duration_s, seed};
+  const app::SimOptions options{{true, 0.0, yaw_rate_rad_s}, duration_s, seed};
   return app::simulate<app::MipFirmware>(load_mip(kMip, set).config, choice, options, nullptr, never);
 }
 

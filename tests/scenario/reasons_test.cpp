@@ -109,7 +109,8 @@ std::uint32_t reversed_encoder(std::size_t wheel) {
 /// Upright in a fist: told to drive, but the wheels only creep.
 std::uint32_t held_fast(double creep_rad_s) {
   Scene scene;
-  scene.set = {"safety.encoder_check_drive=0.0", "safety.max_innovation=1000.0"};
+  scene.set = {"safety.encoder_check_drive=0.0", "safety.max_innovation=1000.0",
+               "safety.max_disturbance=1000.0"};
   scene.spoil = [creep_rad_s, first = RawSample{}](RawSample& raw, std::int64_t tick) mutable {
     if (tick < 0) {
       first = raw;
@@ -220,7 +221,17 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
          if (tick > 100) raw.valid &= ~static_cast<unsigned>(RIO_ENCODERS);
        });
      }},
-    {kNotFinite, [] { return after(app::FaultKind::kNotANumber); }},
+    {kNotFinite,
+     [] {
+       Scene scene;
+       scene.commands = [](std::int64_t tick, std::int64_t) {
+         Command command;
+         command.arm = tick >= kArmTick;
+         if (tick > kArmTick + 100) command.yaw_rate_rad_s = NAN;
+         return command;
+       };
+       return mbbr(scene);
+     }},
     {kBatteryLow, [] { return after(app::FaultKind::kBatterySag); }},
     {kAttitudeStale,
      [] {
@@ -241,14 +252,20 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
      [] {
        return with_samples(
            [](RawSample& raw, std::int64_t tick) {
-             if (tick > 100) raw.gyro_counts[0] += 16.4 * 60.0 * (tick / 4 % 2 == 0 ? 1.0 : -1.0);
+             if (tick > 100) raw.accel_counts[0] += 4096.0 * (tick % 2 == 0 ? 1.0 : -1.0);
            },
            {"safety.max_innovation=4.0", "safety.max_innovation_s=0.15"});
      }},
     {kCommandStale, silent_remote},
     {kRealtimeMissing, no_realtime},
     {kGuardDead, silent_guard},
-    {kOverrun, [] { return after(app::FaultKind::kStall50ms); }},
+    {kOverrun,
+     [] {
+       Scene scene;
+       scene.fault = {app::FaultKind::kStall50ms};
+       scene.set = {"safety.max_stalled_ticks=5"};
+       return mbbr(scene);
+     }},
     {kPickedUp, [] { return mip({{"world.nominal.lift_at_s=3.0"}}); }},
     {kStall, [] { return held_fast(0.0); }},
     {kSaturated, [] { return held_fast(1.0); }},
@@ -261,7 +278,12 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
            },
            {"safety.encoder_check_drive=0.0", "safety.max_innovation=1000.0"});
      }},
-    {kEncoderJump, [] { return after(app::FaultKind::kCountJump); }},
+    {kEncoderJump,
+     [] {
+       return with_samples([](RawSample& raw, std::int64_t tick) {
+         if (tick > 100) raw.encoder_counts[0] += 500.0 * static_cast<double>(tick % 2);
+       });
+     }},
     {kBridgeFault,
      [] {
        return with_samples([](RawSample& raw, std::int64_t tick) {
@@ -272,6 +294,8 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
     {kLogFailed, full_disk},
     {kEncoderStuck,
      [] { return driven_off([](RawSample& raw, std::int64_t) { raw.encoder_counts[1] = 17.0; }); }},
+    {kImuUntrusted, [] { return after(app::FaultKind::kGyroXFrozen); }},
+    {kMotorFault, [] { return after(app::FaultKind::kMotorStuck); }},
     {kWheelOne, [] { return reversed_encoder(0); }},
     {kWheelTwo, [] { return reversed_encoder(1); }},
     {kWheelThree, [] { return reversed_encoder(2); }},

@@ -152,6 +152,7 @@ class Flown:
         command += ["--telemetry", "off", "--log", self.log, "--command-key", f"{folder}/key"]
         command += ["--command-url", url, "--set", "motor.bridge=drive_brake", *arguments]
         command += ["--set", "friction.compensation=0.0"]
+        command += ["--set", "chain.gyro_delay_s=0.0"]  # the engine's gyro is live
         self.said = open(f"{folder}/{name}.txt", "w+")  # noqa: SIM115  closed in end()
         self.process = subprocess.Popen(command, stderr=self.said, stdout=subprocess.DEVNULL)
         self.stopped = threading.Event()

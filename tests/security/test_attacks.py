@@ -23,7 +23,7 @@ def outcome(root, folder, wire):
     if wire not in played:
         command = [root / "tools/lib/multicast", sys.executable, root / "tests/security/attacks.py"]
         command += [root / "build/host/equipoise", root / "config/mbbr.toml", folder, wire]
-        environment = {**os.environ, "PYTHONPATH": f"{root}/tools:{root}/build/host/lcm/python"}
+        environment = {**os.environ, "PYTHONPATH": f"{root}/tools:{root}/python:{root}/build/host/lcm/python"}
         played[wire] = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
     ended = played[wire]
     if ended.returncode == 77:

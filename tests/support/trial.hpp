@@ -7,20 +7,10 @@
 #include "app/io/plant_backend.hpp"
 #include "app/run/firmware.hpp"
 #include "equipoise/runtime/loop.hpp"
+#include "support/config_files.hpp"
 #include "support/stepped_io.hpp"
 
 namespace equipoise {
-
-template <class Firmware>
-std::string config_file();
-template <>
-inline std::string config_file<app::MbbrFirmware>() {
-  return std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
-}
-template <>
-inline std::string config_file<app::MipFirmware>() {
-  return std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml";
-}
 
 struct TrialEnd {
   ArmState arm_state = ArmState::kDisarmed;

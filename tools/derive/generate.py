@@ -1,6 +1,6 @@
 """Regenerates config/generated, or with --check compares it with what the scripts give now.
 
-python3 -m tools.derive            write every header
+python3 -m tools.derive            write every file
 python3 -m tools.derive --check    exit 1 and name the file when one is stale
 """
 
@@ -12,11 +12,15 @@ import re
 import sys
 from pathlib import Path
 
-from . import mbbr_header, mip_header
+from . import filter_header, mbbr_filter, mbbr_header, mip_filter, mip_header
 
 TARGETS = {
     "mbbr_model.hpp": mbbr_header.render,
     "mip_model.hpp": mip_header.render,
+    "mbbr_filter.hpp": lambda: filter_header.render(mbbr_filter.made()),
+    "mbbr_filter.cpp": lambda: filter_header.render_code(mbbr_filter.made()),
+    "mip_filter.hpp": lambda: filter_header.render(mip_filter.made()),
+    "mip_filter.cpp": lambda: filter_header.render_code(mip_filter.made()),
 }
 DEFAULT_FOLDER = Path(__file__).resolve().parents[2] / "config" / "generated"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:e[-+]?\d+)?(?!\w)")
@@ -33,7 +37,7 @@ def same(old: str, new: str) -> bool:
 
 
 def stale(folder: Path) -> list[str]:
-    """What is wrong with the committed headers."""
+    """What is wrong with the committed files."""
     found = []
     for name, render in TARGETS.items():
         path = folder / name
@@ -47,7 +51,7 @@ def stale(folder: Path) -> list[str]:
 def main(arguments=None) -> int:
     parser = argparse.ArgumentParser(prog="python3 -m tools.derive", description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="compare only; exit 1 when a file is stale")
-    parser.add_argument("--output", type=Path, default=DEFAULT_FOLDER, help="folder of the headers")
+    parser.add_argument("--output", type=Path, default=DEFAULT_FOLDER, help="folder of the files")
     options = parser.parse_args(arguments)
     found = stale(options.output) if options.check else []
     for problem in found:

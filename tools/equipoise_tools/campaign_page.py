@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .campaign_statistics import influences, survival_over_time, wilson
+from .campaign_statistics import influences, quantile_interval, survival_over_time, wilson
 
 WORST = 12
 
@@ -71,19 +71,44 @@ def drawn_of(rows: list[dict]) -> dict[str, np.ndarray]:
 
 def survival_table(rows: list[dict]) -> list[str]:
     lines = [
-        "| yaw Hz | m/s | trials | upright | 95 % interval | attitude RMSE rad, median / p95 |",
+        "| yaw Hz | m/s | trials | upright | 95 % interval | of them degraded |",
         "|---|---|---|---|---|---|",
     ]
     for yaw, drive in points_of(rows):
         here = at_point(rows, (yaw, drive))
         upright = sum(not row["fell"] for row in here)
         low, high = wilson(upright, len(here))
-        attitude = _column([row for row in here if not row["fell"]], "attitude_rmse_rad")
-        errors = f"{np.median(attitude):.4f} / {np.quantile(attitude, 0.95):.4f}" if len(attitude) else "-"
+        degraded = sum(bool(row.get("degraded")) for row in here if not row["fell"])
         lines.append(
             f"| {yaw:g} | {drive:g} | {len(here)} | {100 * upright / len(here):.2f} % | "
-            f"{100 * low:.2f} - {100 * high:.2f} % | {errors} |"
+            f"{100 * low:.2f} - {100 * high:.2f} % | {degraded} |"
         )
+    return lines
+
+
+ERRORS = (
+    ("attitude_rmse_rad", "attitude RMSE, rad", 1.0, "{:.4f}"),
+    ("yaw_frame_speed_rmse_m_s", "speed RMSE in the yaw frame, cm/s", 100.0, "{:.2f}"),
+    ("heading_error_rad", "heading error at the end, rad", 1.0, "{:.3f}"),
+    ("position_rmse_m", "position RMSE, m (heading's drift included)", 1.0, "{:.3f}"),
+)
+
+
+def error_table(rows: list[dict]) -> list[str]:
+    """Of the upright: median and 95th percentile over the trials, each with its 95 % interval."""
+    lines = ["| yaw Hz | m/s | error | median | 95th percentile |", "|---|---|---|---|---|"]
+    for yaw, drive in points_of(rows):
+        upright = [row for row in at_point(rows, (yaw, drive)) if not row["fell"]]
+        for key, name, scale, form in ERRORS:
+            values = scale * np.abs(_column(upright, key))
+            values = values[np.isfinite(values)]
+            if len(values) == 0:
+                continue
+            cells = []
+            for share in (0.5, 0.95):
+                value, low, high = (form.format(x) for x in quantile_interval(values, share))
+                cells.append(f"{value} ({low} - {high})")
+            lines.append(f"| {yaw:g} | {drive:g} | {name} | {cells[0]} | {cells[1]} |")
     return lines
 
 
@@ -137,6 +162,10 @@ def page(rows: list[dict], settings: dict) -> str:
         f"{len(rows) - len(fell)} upright to the end, {len(fell)} not.",
         "",
         *survival_table(rows),
+        "",
+        "Errors of those upright to the end, after the first 5 s:",
+        "",
+        *error_table(rows),
         "",
         "![survival](survival.png)",
         "",

@@ -20,6 +20,16 @@ def wilson(successes: int, trials: int, z: float = Z95) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
+def quantile_interval(values: np.ndarray, share: float, z: float = Z95) -> tuple[float, float, float]:
+    """Quantile of a sample and its confidence interval by order statistics: no distribution is assumed."""
+    ordered = np.sort(values)
+    n = len(ordered)
+    half = z * math.sqrt(n * share * (1 - share))
+    low = max(math.floor(n * share - half), 0)
+    high = min(math.ceil(n * share + half), n - 1)
+    return float(np.quantile(ordered, share)), float(ordered[low]), float(ordered[high])
+
+
 def ranks(values: np.ndarray) -> np.ndarray:
     """1 for the smallest; equal values share the mean of their ranks."""
     order = np.argsort(values, kind="stable")

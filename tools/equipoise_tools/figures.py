@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from equipoise_robot.log import Log
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from . import names, style
-from .log import Log
 from .metrics import Summary, estimator_channels, outcome, run_record, tilt_axes
 from .style import plt
 

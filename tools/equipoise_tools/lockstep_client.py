@@ -1,7 +1,7 @@
 """A physics engine for `equipoise run --backend lockstep` in about fifty lines: the MBBR, no friction.
 
     build/host/equipoise run --config config/mbbr.toml --backend lockstep --socket /tmp/mbbr.sock \
-        --set motor.bridge=drive_brake --set friction.compensation=0.0 &
+        --set motor.bridge=drive_brake --set friction.compensation=0.0 --set chain.gyro_delay_s=0 &
     build/venv/bin/python -m equipoise_tools.lockstep_client /tmp/mbbr.sock --duration-s 20
 
 The protocol is docs/lockstep.md; replace `Robot` by your engine.

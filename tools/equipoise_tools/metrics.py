@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from equipoise_robot.log import Log
 
 from . import names
-from .log import Log
 
 # Errors count from 5 s on, as in `equipoise sim --json`; less half a tick, for time stamps are rounded.
 SETTLE_S = 5.0 - 0.0025
@@ -36,7 +36,7 @@ class Summary:
     duration_s: float
     ticks: int
     armed_s: float
-    ended: str  # finished, fell or disarmed; what else ended a run is not in its ticks
+    ended: str  # one of names.ENDED; of a log that was cut off: finished, fell or disarmed
     reasons: list[str]
     fell_at_s: float | None  # when it fell or was disarmed
     yaw_rate_mean_hz: float | None = None
@@ -152,7 +152,14 @@ def true_tilt_at(log: Log, ticks: np.ndarray) -> np.ndarray:
 
 
 def verdict(log: Log) -> tuple[str, list[str], float | None]:
-    """How it ended, the reasons against the motors then, and when it fell or was disarmed."""
+    """How it ended, the reasons against the motors then, and when it fell or was disarmed: as the run judged
+    itself; of a log that was cut off, what its ticks say."""
+    if names.VERDICT in log:
+        last = log[names.VERDICT][-1]
+        fell_at_s = float(last["fell_at_s"])
+        why = names.bits(int(last["reasons"]) & 0xFFFFFFFF, names.SAFETY_REASONS)
+        ended = names.ENDED[last["ended"]] if 0 <= last["ended"] < len(names.ENDED) else "finished"
+        return ended, why, None if np.isnan(fell_at_s) else fell_at_s
     if names.HEALTH not in log:
         return "finished", [], None
     health, t_s = log[names.HEALTH], log.seconds(names.HEALTH)
@@ -184,7 +191,12 @@ def outcome(summary: Summary) -> str:
         return f"never armed{why}"
     if summary.ended == "disarmed":
         return f"motors went off at {summary.fell_at_s:.2f} s{why}"
-    return f"ended with the motors off{why}" if why else "upright to the end"
+    if summary.ended in ("interrupted", "device"):
+        how = "interrupted" if summary.ended == "interrupted" else "the device failed"
+        return f"{how} after {summary.duration_s:.1f} s{why}"
+    if not why:
+        return "upright to the end"
+    return f"disarmed at the end{why}" if summary.armed_s else f"disarmed all the time{why}"
 
 
 def summarise(log: Log) -> Summary:

@@ -1,14 +1,34 @@
 """Channels, and the words for what the firmware sends as numbers (a test holds them to the C++ headers)."""
 
-RUN = "EQUIPOISE_RUN"
-SENSORS = "EQUIPOISE_SENSORS"
-COMMAND = "EQUIPOISE_COMMAND"
-STATE = "EQUIPOISE_STATE"
-REFERENCE = "EQUIPOISE_REFERENCE"
-TRUTH = "EQUIPOISE_TRUTH"
-MOTORS = "EQUIPOISE_MOTORS"
-HEALTH = "EQUIPOISE_HEALTH"
-TIMING = "EQUIPOISE_TIMING"
+from equipoise_robot.channels import (
+    COMMAND,
+    HEALTH,
+    MOTORS,
+    REFERENCE,
+    RUN,
+    SENSORS,
+    STATE,
+    TIMING,
+    TIMING_HISTOGRAM,
+    TRUTH,
+    VERDICT,
+)
+
+__all__ = [
+    "COMMAND",
+    "HEALTH",
+    "MOTORS",
+    "REFERENCE",
+    "RUN",
+    "SENSORS",
+    "STATE",
+    "TIMING",
+    "TIMING_HISTOGRAM",
+    "TRUTH",
+    "VERDICT",
+]
+
+ENDED = ("finished", "fell", "disarmed", "interrupted", "device")
 
 ARM_STATES = ("disarmed", "armed", "fault")
 # Bit by bit, enum SafetyReason.
@@ -41,6 +61,8 @@ SAFETY_REASONS = (
     "wheel two",
     "wheel three",
     "wheel four",
+    "imu untrusted",
+    "motor fault",
 )
 # Bit by bit, enum rio_health.
 SENSOR_HEALTH = (
@@ -53,6 +75,17 @@ SENSOR_HEALTH = (
     "encoder error",
     "bridge fault",
     "battery error",
+)
+# Bit by bit, enum DegradedBit.
+DEGRADED = (
+    "without imu",
+    "without encoders",
+    "estimator in doubt",
+    "without wheel one",
+    "without wheel two",
+    "without wheel three",
+    "without wheel four",
+    "without gyro axis",
 )
 
 

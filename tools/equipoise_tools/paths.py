@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from equipoise_robot.errors import UserError
 
-class UserError(Exception):
-    """Wrong input or set-up: one line for the user, exit status 2."""
+__all__ = ["UserError", "import_lcm_types", "repository_root"]
 
 
 def repository_root() -> Path:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import matplotlib
 
 matplotlib.use("Agg")
@@ -48,3 +50,19 @@ def dash(index: int):
 
 def styled():
     return plt.rc_context(RC)
+
+
+def save(figure: plt.Figure, path: Path) -> None:
+    """PATH.png and PATH.svg, the same bytes every time; closes the figure."""
+    figure.savefig(path.with_suffix(".png"), dpi=100, metadata={"Software": None})
+    with plt.rc_context(
+        {"svg.hashsalt": "equipoise", "svg.fonttype": "none", "path.simplify_threshold": 0.5}
+    ):
+        figure.savefig(path.with_suffix(".svg"), metadata={"Date": None, "Creator": None})
+    plt.close(figure)
+
+
+def legend_above(figure: plt.Figure, axes: plt.Axes, columns: int = 5) -> None:
+    """Of one panel for all, where no data is under it."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns)

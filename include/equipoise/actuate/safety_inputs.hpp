@@ -24,7 +24,7 @@ SafetyInputs safety_inputs(const Measurement<Wheels>& z, const StateView& x_hat,
   SafetyInputs in;
   in.state = x_hat;
   in.imu_ok = z.imu_ok;
-  in.imu_gap = z.imu_gap;
+  in.ticks = z.ticks;
   in.encoders_ok = z.encoders_ok;
   in.encoder_jump = z.encoder_jump;
   in.battery_ok = z.battery_ok;
@@ -38,7 +38,7 @@ SafetyInputs safety_inputs(const Measurement<Wheels>& z, const StateView& x_hat,
   in.encoders_in_check = check.running();
   in.encoders_stuck = check.faults().stuck;
   in.encoders_reversed = check.faults().reversed;
-  in.all_finite = z.all_finite && finite(asked) && finite(x_hat);
+  in.all_finite = finite(asked) && finite(x_hat);
   return in;
 }
 

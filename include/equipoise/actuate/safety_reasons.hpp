@@ -36,9 +36,11 @@ enum SafetyReason : std::uint32_t {
   kWheelTwo = 1u << 25,
   kWheelThree = 1u << 26,
   kWheelFour = 1u << 27,
+  kImuUntrusted = 1u << 28,  // an axis lies, or stands still
+  kMotorFault = 1u << 29,    // motors do not do as told
 };
 
-inline constexpr std::array<const char*, 28> kSafetyReasonNames{"not_requested",
+inline constexpr std::array<const char*, 30> kSafetyReasonNames{"not_requested",
                                                                 "tilt",
                                                                 "imu_stale",
                                                                 "encoder_stale",
@@ -65,7 +67,9 @@ inline constexpr std::array<const char*, 28> kSafetyReasonNames{"not_requested",
                                                                 "wheel_1",
                                                                 "wheel_2",
                                                                 "wheel_3",
-                                                                "wheel_4"};
+                                                                "wheel_4",
+                                                                "imu_untrusted",
+                                                                "motor_fault"};
 
 /// Calls `with(name)` for every bit that is set.
 template <class With>

@@ -38,6 +38,9 @@ CMatrix riccati(const CMatrix& A, const CMatrix& B, const CMatrix& Q, const CMat
 CMatrix lqr(const SampledSystem& system, const Eigen::VectorXd& state_weights,
             const Eigen::VectorXd& input_weights);
 
+/// Of a square matrix. (Eigen's solvers of its own would also compile what eigenvectors need, in every file.)
+Eigen::VectorXcd eigenvalues(const CMatrix& A);
+
 /// Largest closed-loop magnitude under u = -K (x, u before).
 double largest_pole(const SampledSystem& system, const CMatrix& K);
 /// Closed-loop poles of the same.

@@ -10,11 +10,16 @@ namespace equipoise {
 
 template <int Wheels>
 struct EstimatorHealth {
-  double tilt_sigma_rad = 0.0;   // 0: not known
-  std::uint32_t lost = 0;        // bit per wheel whose encoder is not used any more
-  bool stood_still = false;      // when it was found out
-  bool while_arming = false;     // found so early that the robot had better not run without it
-  bool checking = false;         // just armed: the encoders are on trial
+  double tilt_sigma_rad = 0.0;    // 0: not known
+  std::uint32_t lost = 0;         // bit per wheel whose encoder is not used any more
+  bool stood_still = false;       // when it was found out
+  bool while_arming = false;      // found so early that the robot had better not run without it
+  bool checking = false;          // just armed: the encoders are on trial
+  std::uint32_t dead = 0;         // bits of encoders that stand still together while the robot moves
+  double bias_drift_rad_s = 0.0;  // of the gyro, lately
+  double disturbance = 0.0;       // of u: what acts like motors that do not do as told
+  bool gyro_left_out = false;     // an axis of it
+  bool gyro_trusted = true;
   bool predicts_wheels = false;  // `wheel_rate_rad_s` may stand in for an encoder
   Vec<Wheels> wheel_rate_rad_s = Vec<Wheels>::Zero();
 };

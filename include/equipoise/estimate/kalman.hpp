@@ -41,6 +41,7 @@ class KalmanFilter {
     P_ = params_.initial_variance.asDiagonal();
     normalized_innovation_ = 0.0;
     row_nis_.fill(0.0);
+    row_innovation_.fill(0.0);
   }
 
   void predict(const Vec<p>& u) noexcept {
@@ -61,7 +62,7 @@ class KalmanFilter {
     int used = 0;
     for (int i = 0; i < m; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      row_nis_[row] = 0.0;
+      row_nis_[row] = row_innovation_[row] = 0.0;
       if (!use[row]) continue;
       const Vec<n> h = H_.row(i).transpose();
       const Vec<n> Ph = P_ * h;
@@ -74,6 +75,7 @@ class KalmanFilter {
       for (int j = 0; j < n; ++j) {
         P_.col(j) += (k * k(j)) * s - (k * Ph(j) + Ph * k(j));
       }
+      row_innovation_[row] = innovation;
       row_nis_[row] = innovation * innovation / s;
       nis += row_nis_[row];
       ++used;
@@ -92,6 +94,8 @@ class KalmanFilter {
   double normalized_innovation() const noexcept { return normalized_innovation_; }
   /// Squared innovation over its variance, of each row; 0 where it was not used.
   const std::array<double, m>& row_nis() const noexcept { return row_nis_; }
+  /// In the rows' units.
+  const std::array<double, m>& row_innovation() const noexcept { return row_innovation_; }
   const Model& model() const noexcept { return model_; }
 
  private:
@@ -105,6 +109,7 @@ class KalmanFilter {
   Mat<m, n> H_ = Mat<m, n>::Zero();
   double normalized_innovation_ = 0.0;
   std::array<double, m> row_nis_{};
+  std::array<double, m> row_innovation_{};
 };
 
 }  // namespace equipoise

@@ -37,10 +37,12 @@ class TimeBase {
 
   /// A tick passes: `u` acted since the last one.
   void advance(const Input& u) noexcept {
-    std::rotate(inputs_.rbegin(), inputs_.rbegin() + 1, inputs_.rend());
+    for (std::size_t i = kMaxTicks; i > 0; --i) {
+      inputs_[i] = inputs_[i - 1];
+      angles_[i] = angles_[i - 1];
+      known_[i] = known_[i - 1];
+    }
     inputs_.front() = u;
-    std::rotate(angles_.rbegin(), angles_.rbegin() + 1, angles_.rend());
-    std::rotate(known_.rbegin(), known_.rbegin() + 1, known_.rend());
     known_.front().fill(false);
   }
 
@@ -53,15 +55,21 @@ class TimeBase {
   /// Mean input over the filter's last tick, which ended `age` ago.
   Input acted() const noexcept { return (1.0 - part_) * input(0) + part_ * input(1); }
 
-  /// Where the wheels stood `age` ago; `rate` bridges samples that are missing.
-  Angles stood(const Angles& rate) const noexcept {
-    Angles then = angles_.front() - age_s_ * rate;
+  /// Where the wheels stood `age` ago; `rate()` bridges samples that are missing.
+  template <class Rate>
+  Angles stood(Rate&& rate) const noexcept {
     const auto w = static_cast<std::size_t>(whole_);
-    for (int i = 0; i < Wheels; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (known_[w][k] && known_[w + 1][k]) {
-        then(i) = angles_[w](i) + part_ * (angles_[w + 1](i) - angles_[w](i));
-      }
+    Angles then = angles_[w] + part_ * (angles_[w + 1] - angles_[w]);
+    Flags known;
+    bool all = true;
+    for (std::size_t i = 0; i < Wheels; ++i) {
+      known[i] = known_[w][i] && known_[w + 1][i];
+      all = all && known[i];
+    }
+    if (all) return then;
+    const Angles bridged = angles_.front() - age_s_ * rate();
+    for (std::size_t i = 0; i < Wheels; ++i) {
+      if (!known[i]) then(static_cast<int>(i)) = bridged(static_cast<int>(i));
     }
     return then;
   }

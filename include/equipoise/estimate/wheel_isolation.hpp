@@ -22,7 +22,9 @@ class WheelIsolation {
   using Sample = Measurement<Wheels>;
   static constexpr int kArmingTicks = 100;  // after arming the bank runs anyway
 
-  explicit WheelIsolation(const Filter& filter) : bank_(filled(filter, std::make_index_sequence<Wheels>())) {}
+  /// `play_rad`: spin that a motor can turn alone, within its gears.
+  explicit WheelIsolation(const Filter& filter, double play_rad = 0.0)
+      : bank_(filled(filter, std::make_index_sequence<Wheels>())), play_rad_(play_rad) {}
 
   /// Motors off: every wheel is trusted again.
   void reset() noexcept {
@@ -31,7 +33,9 @@ class WheelIsolation {
     quiet_ = kArmingTicks;
     hits_ = 0;
     slip_ = 0.0;
+    slipped_rad_ = 0.0;
     still_.fill(0);
+    slipped_still_rad_.fill(0.0);
     mean_.fill(0.0);
     known_ = false;
     stood_still_ = false;
@@ -44,12 +48,16 @@ class WheelIsolation {
   void step(Filter& filter, const Input& u, const Sample& z, Spin&& spin) noexcept {
     ++ticks_;
     watch(z, spin);
-    Sample used = z;
-    if (lost_ >= 0) used.wheel_ok[static_cast<std::size_t>(lost_)] = false;
-    if (lost_ < 0 && !running_ && suspicious()) start(filter);
+    if (lost_ >= 0) {
+      Sample used = z;
+      used.wheel_ok[static_cast<std::size_t>(lost_)] = false;
+      filter.predict(u);
+      filter.update(used);
+      return;
+    }
+    if (!running_ && suspicious()) start(filter);
     filter.predict(u);
-    filter.update(used);
-    if (lost_ >= 0) return;
+    filter.update(z);
     follow(mean_[Wheels], filter, -1);
     if (!running_) return;
     for (int i = 0; i < Wheels; ++i) {
@@ -69,6 +77,10 @@ class WheelIsolation {
   int lost() const noexcept { return lost_; }
   /// It stood still when it was found out; else it counted wrongly.
   bool stood_still() const noexcept { return stood_still_; }
+  /// And still does: no other sensor can make it look so.
+  bool stands_still() const noexcept {
+    return lost_ >= 0 && still_[static_cast<std::size_t>(lost_)] >= kStillTicks;
+  }
   /// So soon after arming that the robot had better not run without it.
   bool while_arming() const noexcept { return lost_ >= 0 && lost_at_ <= kArmingTicks; }
   /// Just armed: a lying encoder surprises the estimator before it can be named.
@@ -85,13 +97,15 @@ class WheelIsolation {
   static constexpr int kStillTicks = 6;
   static constexpr double kMean = 0.2;  // of the squared innovations: five ticks
   static constexpr double kSlipMean = 0.15;
+  static constexpr double kForgets = 0.02;    // of the angle: 50 ticks
   static constexpr double kLargest = 100.0;   // one outlier decides nothing
   static constexpr double kSlip_rad_s = 0.3;  // pushes do not enter it
-  static constexpr double kSurprised = 2.0;   // mean of the filter with all wheels
-  static constexpr double kSuspicious = 1.0;
+  static constexpr double kSurprised = 1.0;   // mean of the filter with all wheels
+  static constexpr double kSuspicious = 0.5;
   static constexpr double kExplains = 0.25;  // of the surprise is left without the wheel
   static constexpr double kExplainsStill = 0.8;
   static constexpr double kTurning_rad_s = 1.5;
+  static constexpr double kBeyondPlay = 1.5;
 
   template <std::size_t... I>
   static std::array<Filter, sizeof...(I)> filled(const Filter& filter, std::index_sequence<I...>) {
@@ -112,16 +126,20 @@ class WheelIsolation {
 
   template <class Spin>
   void watch(const Sample& z, Spin&& spin) noexcept {
-    if (!z.encoders_ok || !z.imu_ok) {
+    if (!z.encoders_ok || !z.imu_ok || !z.gyro_axis_ok[2] || z.ticks > 1) {
       known_ = false;
+      if (!z.gyro_axis_ok[2]) slip_ = 0.0;  // what it said before may have been false already
       return;
     }
     if (known_) {
       const Vec<Wheels> moved = z.wheel_angle_rad - angle_rad_;
-      slip_ += kSlipMean * (spin(Vec<Wheels>(moved / kTickS)) - slip_);
+      const double slip = spin(Vec<Wheels>(moved / kTickS));
+      slip_ += kSlipMean * (slip - slip_);
+      slipped_rad_ += kTickS * slip - kForgets * slipped_rad_;
       for (int i = 0; i < Wheels; ++i) {
-        int& still = still_[static_cast<std::size_t>(i)];
-        still = moved(i) == 0.0 ? still + 1 : 0;
+        const auto k = static_cast<std::size_t>(i);
+        still_[k] = moved(i) == 0.0 ? still_[k] + 1 : 0;
+        slipped_still_rad_[k] = still_[k] > 0 ? slipped_still_rad_[k] + kTickS * slip : 0.0;
       }
     }
     angle_rad_ = z.wheel_angle_rad;
@@ -144,7 +162,7 @@ class WheelIsolation {
     if (ticks_ < kFirstTick) return;
     const double all = mean_[Wheels];
     int best = -1;
-    if (std::abs(slip_) > kSlip_rad_s && all > kSurprised) {
+    if (std::abs(slip_) > kSlip_rad_s && std::abs(slipped_rad_) > play_rad_ && all > kSurprised) {
       const auto end = mean_.begin() + Wheels;
       const auto least = std::min_element(mean_.begin(), end);
       double second = kLargest;
@@ -154,8 +172,15 @@ class WheelIsolation {
       for (int i = 0; i < Wheels && best < 0; ++i) {
         const auto k = static_cast<std::size_t>(i);
         const bool turning = std::abs(rate(i)) > kTurning_rad_s;
-        if (still_[k] >= kStillTicks && turning && mean_[k] < kExplainsStill * all) best = i;
+        if (still_[k] >= kStillTicks && turning && mean_[k] < kExplainsStill * all && mean_[k] == *least)
+          best = i;
       }
+    }
+    // A robot that hardly moves shows it slowly: one stands still while the others turn further than play
+    // lets them.
+    for (int i = 0; i < Wheels && best < 0 && play_rad_ > 0.0; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (std::abs(slipped_still_rad_[k]) > kBeyondPlay * play_rad_ && mean_[k] < kExplains * all) best = i;
     }
     hits_ = best >= 0 ? hits_ + 1 : 0;
     if (hits_ < kHits) return;
@@ -169,10 +194,13 @@ class WheelIsolation {
   std::array<Filter, static_cast<std::size_t>(Wheels)> bank_;
   std::array<double, kMeans> mean_{};
   std::array<int, static_cast<std::size_t>(Wheels)> still_{};
+  std::array<double, static_cast<std::size_t>(Wheels)> slipped_still_rad_{};  // since it stands still
   Vec<Wheels> angle_rad_ = Vec<Wheels>::Zero();
   bool known_ = false;
+  double play_rad_;
   double slip_ = 0.0;
-  int ticks_ = 0;  // since arming
+  double slipped_rad_ = 0.0;  // of late
+  int ticks_ = 0;             // since arming
   int quiet_ = kArmingTicks;
   int hits_ = 0;
   int lost_ = -1;

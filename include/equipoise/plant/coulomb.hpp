@@ -42,10 +42,12 @@ Vec<N> coulomb_torque(const Vec<N>& free_rate, const Mat<N, N>& mobility, double
   constexpr int kSweeps = 20;
   Vec<N> tau = Vec<N>::Zero();
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    const Vec<N> before = tau;
     for (int i = 0; i < N; ++i) {
       const double rate = free_rate(i) + step_s * mobility.row(i).dot(tau);
       tau(i) = std::clamp(tau(i) - rate / (step_s * mobility(i, i)), -mu_c(i), mu_c(i));
     }
+    if (tau == before) break;  // every further sweep would say the same
   }
   return tau;
 }

@@ -23,12 +23,20 @@ class SimulatedMotors {
         open_V_(world.battery_V),
         resistance_ohm_(world.battery_resistance_ohm),
         diode_drop_V_(world.diode_drop_V),
-        battery_V_(world.battery_V) {}
+        battery_V_(world.battery_V) {
+    supplied();
+  }
 
   void command(const MotorCommand& command) noexcept {
     command_ = command;
-    for (std::size_t i = 0; i < held_.size(); ++i)
-      held_[i] = DriveCoastCommand(motor_.T_r(), calibration_.motor_sign[i] * command.duty[i]);
+    for (std::size_t i = 0; i < N; ++i) {
+      const double duty = calibration_.motor_sign[i] * command.duty[i];
+      if (diode_drop_V_ == 0.0) {
+        held_[i] = DriveCoastCommand(motor_.T_r(), duty);
+      } else {
+        held_with_drop_[i] = DriveCoastDropCommand(motor_.T_r(), duty);
+      }
+    }
   }
   bool enabled() const noexcept { return command_.enable; }
   double battery_V() const noexcept { return battery_V_; }
@@ -36,13 +44,9 @@ class SimulatedMotors {
   Vec<N> torque(const Vec<N>& wheel_rate_rad_s) const noexcept {
     Vec<N> torque = Vec<N>::Zero();
     if (!command_.enable) return torque;  // all switches open: the current decays at once
-    const double stall_torque =
-        torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
-    const double no_load = no_load_rad_s();
     for (int i = 0; i < N; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      const double omega_r = wheel_rate_rad_s(i) / no_load;
-      torque(i) = stall_torque * current_over_stall(k, omega_r);
+      torque(i) = stall_torque_N_m_ * current_over_stall(k, wheel_rate_rad_s(i) / no_load_rad_s_);
     }
     return torque;
   }
@@ -54,23 +58,28 @@ class SimulatedMotors {
     double supply_A = 0.0;
     for (int i = 0; i < N && command_.enable; ++i) {
       const double duty = command_.duty[static_cast<std::size_t>(i)];
-      const double omega_r = wheel_rate_rad_s(i) / no_load_rad_s();
+      const double omega_r = wheel_rate_rad_s(i) / no_load_rad_s_;
       supply_A += std::abs(duty * motor_.stall_current_A(battery_V_) * (duty - omega_r));
     }
     battery_V_ = open_V_ - resistance_ohm_ * supply_A;
+    supplied();
   }
 
   /// Torque lost per rad/s of a wheel while its bridge drives. (5.12)
   double damping_N_m_s() const noexcept { return torque_scale_ * back_emf_scale_ * motor_.k2(); }
 
  private:
-  double no_load_rad_s() const noexcept { return motor_.no_load_rad_s(battery_V_) / back_emf_scale_; }
+  /// What follows from the battery's voltage.
+  void supplied() noexcept {
+    stall_torque_N_m_ = torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
+    no_load_rad_s_ = motor_.no_load_rad_s(battery_V_) / back_emf_scale_;
+    diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
+  }
   double current_over_stall(std::size_t k, double omega_r) const noexcept {
-    const double duty = calibration_.motor_sign[k] * command_.duty[k];
-    if (motor_.bridge == BridgeType::kDriveBrake) return duty - omega_r;
+    if (motor_.bridge == BridgeType::kDriveBrake)
+      return calibration_.motor_sign[k] * command_.duty[k] - omega_r;
     if (diode_drop_V_ == 0.0) return held_[k].mean_current(omega_r);
-    const double opposing = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
-    return drive_coast_mean_current_with_drop(motor_.T_r(), omega_r, duty, opposing);
+    return held_with_drop_[k].mean_current(omega_r, diodes_oppose_);
   }
 
   MotorParameters motor_;
@@ -81,8 +90,12 @@ class SimulatedMotors {
   double resistance_ohm_;
   double diode_drop_V_;
   double battery_V_;
+  double stall_torque_N_m_ = 0.0;
+  double no_load_rad_s_ = 0.0;
+  double diodes_oppose_ = 1.0;
   MotorCommand command_{};
   std::array<DriveCoastCommand, N> held_{};  // the integrator asks at many speeds per command
+  std::array<DriveCoastDropCommand, N> held_with_drop_{};
 };
 
 }  // namespace equipoise

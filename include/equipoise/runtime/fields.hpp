@@ -104,6 +104,18 @@ struct Histogram {
   }
 };
 
+/// Of an EndRecord.
+struct End {
+  static constexpr const char* kType = "verdict_t";
+  template <class Record, class Visit>
+  static constexpr void visit(Record& r, Visit&& field) {
+    field("ended", "", r.ended);
+    field("reasons", "bits", r.reasons);
+    field("fell_at_s", "s", r.fell_at_s);
+    field("duration_s", "s", r.duration_s);
+  }
+};
+
 struct Run {
   static constexpr const char* kType = "run_t";
   template <class Record, class Visit>
@@ -126,6 +138,7 @@ struct Run {
 inline constexpr const char* kRunChannel = "EQUIPOISE_RUN";
 inline constexpr const char* kSensorsChannel = "EQUIPOISE_SENSORS";
 inline constexpr const char* kHistogramChannel = "EQUIPOISE_TIMING_HISTOGRAM";
+inline constexpr const char* kEndChannel = "EQUIPOISE_VERDICT";
 inline constexpr const char* kTruthChannel = "EQUIPOISE_TRUTH";
 /// Of an estimator that runs beside the controlling one: this and its name in capitals.
 inline constexpr std::string_view kComparedChannel = "EQUIPOISE_STATE_";

@@ -24,21 +24,29 @@ struct NoSupervisor {
   void end(bool /*driven*/, int /*write_error*/) noexcept {}
 };
 
+/// One turn of the loop; false, with end->error, when the wait failed.
+template <class Io, class Pipeline, class Commands, class Observer, class Supervisor>
+bool run_tick(Io& io, Pipeline& pipeline, Commands&& commands, Observer&& observe, Supervisor& supervisor,
+              LoopEnd* end) noexcept {
+  std::int64_t now_ns = 0;
+  end->error = io.wait_tick(&now_ns);
+  if (end->error != 0) return false;
+  const RawSample raw = io.read();
+  const std::uint32_t inhibit = supervisor.begin(now_ns, raw);
+  const Command command = commands(end->ticks, now_ns);
+  const auto result = pipeline.tick(raw, command, {now_ns, inhibit});
+  supervisor.end(result.motors.enable, io.write(result.motors));
+  observe(end->ticks, now_ns, raw, command, result);
+  ++end->ticks;
+  return true;
+}
+
 template <class Io, class Pipeline, class Commands, class Observer, class Supervisor>
 LoopEnd run_loop(Io& io, Pipeline& pipeline, Commands&& commands, Observer&& observe,
                  const std::atomic<bool>& stop, Supervisor& supervisor) noexcept {
   LoopEnd end;
-  while (!stop.load(std::memory_order_relaxed)) {
-    std::int64_t now_ns = 0;
-    end.error = io.wait_tick(&now_ns);
-    if (end.error != 0) break;
-    const RawSample raw = io.read();
-    const std::uint32_t inhibit = supervisor.begin(now_ns, raw);
-    const Command command = commands(end.ticks, now_ns);
-    const auto result = pipeline.tick(raw, command, inhibit);
-    supervisor.end(result.motors.enable, io.write(result.motors));
-    observe(end.ticks, now_ns, raw, command, result);
-    ++end.ticks;
+  while (!stop.load(std::memory_order_relaxed) &&
+         run_tick(io, pipeline, commands, observe, supervisor, &end)) {
   }
   supervisor.end(false, io.motors_off());  // the guard need not wait for our silence
   return end;

@@ -73,6 +73,14 @@ struct TickRecord {
 static_assert(std::is_trivially_copyable_v<TickRecord>, "the hand-over is a memcpy");
 static_assert(kMaxEstimators <= 32, "TickRecord::compared has a bit for each");
 
+/// How a run ended: its last event, where it could still write one.
+struct EndRecord {
+  std::int32_t ended = 0;     // finished, fell, disarmed, interrupted, device
+  std::uint32_t reasons = 0;  // SafetyReason bits: when the motors went off, else at the end
+  double fell_at_s = 0.0;     // NaN: neither fell nor disarmed
+  double duration_s = 0.0;
+};
+
 /// What a log is a log of: its first event.
 struct RunInfo {
   std::string robot;

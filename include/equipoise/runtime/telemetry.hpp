@@ -1,13 +1,14 @@
 // Takes one record per tick from the real-time thread and, on a thread of its own, writes it to an LCM event
 // log and publishes it. In: TickRecord, lock-free -> out: log file, LCM messages (package equipoise).
 // hand_over() is RT-safe; everything else is not. SIGKILL costs the log less than 100 ms. A telemetry URL
-// that cannot be opened is a warning, never a reason not to fly; a log that cannot be written is reported by
+// that cannot be opened is a warning, never a reason not to run; a log that cannot be written is reported by
 // finish() and by log_failed().
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -54,16 +55,18 @@ class Telemetry {
   const std::atomic<bool>& log_failed() const noexcept { return log_failed_; }
   std::int64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
-  /// Drains, closes and joins; further records are ignored.
-  TelemetryReport finish();
+  /// Drains, writes how the run ended, closes and joins; further records are ignored.
+  TelemetryReport finish(const EndRecord& end);
 
  private:
   class Writer;
   void run();
+  TelemetryReport join();
 
   TelemetryOptions options_;
   SpscQueue<TickRecord> queue_;
   TelemetryReport report_;
+  std::optional<EndRecord> end_;  // before stop_ for the thread; none: the owner was left by an exception
   std::atomic<bool> stop_{false};
   std::atomic<bool> log_failed_{false};
   std::atomic<std::int64_t> dropped_{0};

@@ -14,6 +14,7 @@
 #include <equipoise/state_t.hpp>
 #include <equipoise/timing_histogram_t.hpp>
 #include <equipoise/timing_t.hpp>
+#include <equipoise/verdict_t.hpp>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -33,6 +34,7 @@ inline std::int64_t fingerprint(fields::Motors) { return motors_t::getHash(); }
 inline std::int64_t fingerprint(fields::Health) { return health_t::getHash(); }
 inline std::int64_t fingerprint(fields::Timing) { return timing_t::getHash(); }
 inline std::int64_t fingerprint(fields::Histogram) { return timing_histogram_t::getHash(); }
+inline std::int64_t fingerprint(fields::End) { return verdict_t::getHash(); }
 inline std::int64_t fingerprint(fields::Run) { return run_t::getHash(); }
 
 template <class Message>

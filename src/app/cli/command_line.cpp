@@ -1,8 +1,13 @@
 #include "app/cli/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <sstream>
+
+#include "config/nearest.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -42,6 +47,94 @@ CLI::Option* add_numbers(void* impl, const std::string& name, T& value, const st
   return option;
 }
 
+constexpr const char* kFileType = "FILE";
+const std::string kExample = "Example: ";
+
+/// "TEXT:{dmp,own}" or "FLOAT:FLOAT in [-5 - 5]", as the parser shows it: value, choices, range.
+void describe_values(const std::string& shown, OptionDescription* out) {
+  out->value = shown.substr(0, shown.find(':'));
+  if (out->value == "FLOAT" || out->value == "INT" || out->value == "UINT") out->value = "NUMBER";
+  const std::size_t brace = shown.find('{');
+  if (brace != std::string::npos) {
+    std::istringstream names(shown.substr(brace + 1, shown.rfind('}') - brace - 1));
+    for (std::string name; std::getline(names, name, ',');) out->choices.push_back(name);
+  }
+  const std::size_t range = shown.find(" in [");
+  if (range != std::string::npos) {
+    out->range = shown.substr(range + 5, shown.find(']', range) - range - 5);
+    const std::size_t dash = out->range.find(" - ");
+    if (dash != std::string::npos) out->range.replace(dash, 3, " to ");
+  }
+}
+
+OptionDescription described(const CLI::Option& option) {
+  OptionDescription out;
+  for (const std::string& name : option.get_snames()) out.names.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) out.names.push_back("--" + name);
+  out.positional = option.get_positional();
+  if (out.positional) out.names.push_back(option.get_name());
+  if (option.get_items_expected_max() > 0) describe_values(option.get_type_name(), &out);
+  out.help = option.get_description();
+  out.standard = option.get_default_str();
+  out.required = option.get_required();
+  out.repeats = option.get_expected_max() > 1;
+  return out;
+}
+
+CommandDescription described(const CLI::App& app, const std::string& name) {
+  CommandDescription out;
+  out.name = name;
+  out.help = app.get_description();
+  if (app.get_footer().rfind(kExample, 0) == 0) out.example = app.get_footer().substr(kExample.size());
+  for (const CLI::Option* option : app.get_options({})) out.options.push_back(described(*option));
+  for (const CLI::App* below : app.get_subcommands(std::function<bool(const CLI::App*)>{}))
+    out.commands.push_back(described(*below, name + (name.empty() ? "" : " ") + below->get_name()));
+  return out;
+}
+
+/// The first word that is no option or command, and what may have been meant.
+struct Mistake {
+  std::string where;  // "equipoise config"
+  std::string word;   // empty: there is none
+  std::string meant;  // empty: nothing is near
+};
+
+Mistake mistake_in(const CLI::App& root, int argc, char** argv) {
+  const CLI::App* app = &root;
+  std::string where = "equipoise";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word(argv[i]);
+    const std::string name = word.substr(0, word.find('='));
+    if (name == "--") break;
+    std::vector<std::string> known;
+    const bool is_option =
+        word.size() > 1 && word[0] == '-' && std::isdigit(static_cast<unsigned char>(word[1])) == 0;
+    if (is_option) {
+      const CLI::Option* option = app->get_option_no_throw(name);
+      if (option != nullptr) {
+        if (option->get_items_expected_max() > 0 && name.size() == word.size())
+          i += option->get_items_expected_min();
+        continue;
+      }
+      for (const CLI::Option* each : app->get_options({}))
+        for (const std::string& one : each->get_lnames()) known.push_back("--" + one);
+    } else {
+      const auto below = app->get_subcommands(std::function<bool(const CLI::App*)>{});
+      if (below.empty()) continue;  // an argument, or too many of them
+      const auto found = std::find_if(below.begin(), below.end(),
+                                      [&](const CLI::App* each) { return each->get_name() == word; });
+      if (found != below.end()) {
+        app = *found;
+        where += " " + word;
+        continue;
+      }
+      for (const CLI::App* each : below) known.push_back(each->get_name());
+    }
+    return Mistake{where, name, config::nearest(name, known)};
+  }
+  return {where, "", ""};
+}
+
 }  // namespace
 
 Option Option::required() const {
@@ -70,6 +163,10 @@ Option Option::needs(const Option& other) const {
 }
 Option Option::count(int values) const {
   option_of(impl_)->expected(values);
+  return *this;
+}
+Option Option::file() const {
+  option_of(impl_)->type_name(kFileType);
   return *this;
 }
 bool Option::given() const { return option_of(impl_)->count() > 0; }
@@ -108,6 +205,11 @@ Option Subcommand::option(const std::string& name, std::vector<int>& value, cons
 Option Subcommand::flag(const std::string& name, bool& value, const std::string& help) const {
   return Option(app_of(impl_)->add_flag(name, value, help));
 }
+Subcommand Subcommand::example(const std::string& line) const {
+  app_of(impl_)->footer(kExample + line);
+  return *this;
+}
+CommandDescription Subcommand::describe() const { return described(*app_of(impl_), ""); }
 void Subcommand::action(std::function<int()> run) const {
   app_of(impl_)->callback([run = std::move(run), status = status_] { *status = run(); });
 }
@@ -133,8 +235,16 @@ int CommandLine::run(int argc, char** argv) {
     impl_->app.parse(argc, argv);
     return impl_->status;
   } catch (const CLI::ParseError& error) {
-    impl_->app.exit(error);
-    return error.get_exit_code() == 0 ? 0 : 2;
+    if (error.get_exit_code() == 0) return impl_->app.exit(error);
+    std::string what = error.what();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    const Mistake m = mistake_in(impl_->app, argc, argv);
+    if (!m.word.empty()) {
+      what = m.word + (m.word[0] == '-' ? " is no option of " : " is no command of ") + m.where +
+             (m.meant.empty() ? "" : "; did you mean " + m.meant + "?");
+    }
+    std::fprintf(stderr, "equipoise: %s (%s --help lists what there is)\n", what.c_str(), m.where.c_str());
+    return 2;
   }
 }
 

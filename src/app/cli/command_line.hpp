@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "app/cli/description.hpp"
+
 namespace equipoise::app {
 
 /// A handle: copies name the same option.
@@ -21,6 +23,7 @@ class Option {
   Option excludes(const Option& other) const;
   Option needs(const Option& other) const;
   Option count(int values) const;  // exactly so many values
+  Option file() const;             // its value names a file
   bool given() const;              // in the action: the user named it
 
  private:
@@ -46,6 +49,12 @@ class Subcommand {
   Option option(const std::string& name, std::vector<int>& value, const std::string& help = "") const;
   /// "--yes" or "--yes,!--no".
   Option flag(const std::string& name, bool& value, const std::string& help = "") const;
+
+  /// A line that works, for help and manual.
+  Subcommand example(const std::string& line) const;
+
+  /// Everything below, as it stands now. Of the root.
+  CommandDescription describe() const;
 
   /// Runs when the command was named; returns the exit code.
   void action(std::function<int()> run) const;

@@ -12,6 +12,7 @@ void add_commands(Subcommand app) {
   add_model(app);
   add_bridge(app);
   add_geometry(app);
+  add_config(app);
   add_design(app);
   add_attitude(app);
   add_motor_bench(app);
@@ -24,6 +25,9 @@ void add_commands(Subcommand app) {
   add_doctor(app);
   add_calibrate(app);
   add_bringup(app);
+  add_completion(app);
+  add_man(app);
+  add_dbc(app);
 }
 
 }  // namespace equipoise::app

@@ -3,7 +3,6 @@
 
 #include "app/cli/command_line.hpp"
 #include "app/cli/errors.hpp"
-#include "app/cli/json.hpp"
 
 namespace equipoise::app {
 
@@ -18,6 +17,7 @@ void add_replay(Subcommand app);
 void add_model(Subcommand app);
 void add_bridge(Subcommand app);
 void add_geometry(Subcommand app);
+void add_config(Subcommand app);
 void add_design(Subcommand app);
 void add_attitude(Subcommand app);
 void add_motor_bench(Subcommand app);
@@ -30,6 +30,9 @@ void add_guard(Subcommand app);
 void add_doctor(Subcommand app);
 void add_calibrate(Subcommand app);
 void add_bringup(Subcommand app);
+void add_completion(Subcommand app);
+void add_man(Subcommand app);
+void add_dbc(Subcommand app);
 
 /// A whole file; InputError names it.
 std::string read_text(const std::string& path);

@@ -6,6 +6,7 @@
 #include "app/board/board_edit.hpp"
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
 #include "app/commission/calibrate_imu.hpp"
 #include "app/commission/calibrate_wheels.hpp"
 #include "app/commission/commissioning.hpp"
@@ -14,7 +15,7 @@
 namespace equipoise::app {
 namespace {
 
-struct Arguments {
+struct BringupArguments {
   CommissioningArguments commissioning;
   std::string out = "board.toml";
   bool force = false;
@@ -61,7 +62,7 @@ CalibrationFile measure_gyro(Commissioning& commissioning) {
   return file;
 }
 
-int run_bringup(const Arguments& a) {
+int run_bringup(const BringupArguments& a) {
   Commissioning commissioning(a.commissioning);
   const auto folder = std::filesystem::path(a.out).parent_path();
   const std::string calibration_name = std::filesystem::path(a.out).stem().string() + "-calibration.toml";
@@ -105,13 +106,18 @@ int run_bringup(const Arguments& a) {
 }  // namespace
 
 void add_bringup(Subcommand app) {
-  const Subcommand command = app.subcommand(
-      "bringup", "First power-up, guided: tiny pulses on the stand find the wiring, a board file comes out");
-  auto a = std::make_shared<Arguments>();
+  const Subcommand command =
+      app.subcommand(
+             "bringup",
+             "First power-up, guided: tiny pulses on the stand find the wiring, a board file comes out")
+          .example("equipoise bringup --config config/mbbr.toml --out board.toml");
+  auto a = std::make_shared<BringupArguments>();
   add_options(command, &a->commissioning);
-  command.option("--out", a->out, "board file to write; its calibration goes beside it").show_default();
+  command.option("--out", a->out, "board file to write; its calibration goes beside it")
+      .file()
+      .show_default();
   command.flag("--force", a->force, "replace existing files");
-  command.option("--json", a->json, "result as JSON, - for stdout");
+  command.option("--json", a->json, "result as JSON, - for stdout").file();
   command.action([=] { return run_bringup(*a); });
 }
 

@@ -5,6 +5,8 @@
 
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
+#include "app/cli/text.hpp"
 #include "app/commission/calibrate_imu.hpp"
 #include "app/commission/calibrate_wheels.hpp"
 #include "app/commission/commissioning.hpp"
@@ -18,7 +20,7 @@ constexpr int kMaxPoses = 12;  // six faces and as many mistakes
 constexpr int kTurns = 5;
 constexpr double kMaxCountsError = 0.02;
 
-struct Arguments {
+struct CalibrateArguments {
   CommissioningArguments commissioning;
   std::string what;
   std::string out = "calibration.toml";
@@ -31,13 +33,6 @@ struct Result {
 };
 
 nlohmann::json json_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
-
-template <class... Args>
-std::string format(const char* text, Args... args) {
-  char out[240];
-  std::snprintf(out, sizeof out, text, args...);
-  return out;
-}
 
 Result calibrate_gyro(Commissioning& commissioning, CalibrationFile* file, nlohmann::json* json) {
   const auto manual = commissioning.open();
@@ -184,7 +179,7 @@ Result calibrate_encoders(Commissioning& commissioning, CalibrationFile* file, n
   return result;
 }
 
-int run_calibrate(const Arguments& a) {
+int run_calibrate(const CalibrateArguments& a) {
   Commissioning commissioning(a.commissioning);
   CalibrationFile file;
   if (std::filesystem::exists(a.out)) file = load_calibration(a.out, commissioning.robot());
@@ -212,8 +207,9 @@ int run_calibrate(const Arguments& a) {
 
 void add_calibrate(Subcommand app) {
   const Subcommand command =
-      app.subcommand("calibrate", "Measures a robot at rest or on its stand; keeps the result");
-  auto a = std::make_shared<Arguments>();
+      app.subcommand("calibrate", "Measures a robot at rest or on its stand; keeps the result")
+          .example("equipoise calibrate gyro --config config/mbbr.toml --board board.toml");
+  auto a = std::make_shared<CalibrateArguments>();
   command
       .option("what", a->what,
               "gyro: bias, 3 s at rest; accel: bias and scale, six sides up; mount: how the board sits; "
@@ -221,8 +217,8 @@ void add_calibrate(Subcommand app) {
       .required()
       .one_of({"gyro", "accel", "mount", "motors", "encoders"});
   add_options(command, &a->commissioning);
-  command.option("--out", a->out, "calibration file to add to").show_default();
-  command.option("--json", a->json, "result as JSON, - for stdout");
+  command.option("--out", a->out, "calibration file to add to").file().show_default();
+  command.option("--json", a->json, "result as JSON, - for stdout").file();
   command.action([=] { return run_calibrate(*a); });
 }
 

@@ -4,18 +4,13 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/cli/text.hpp"
+
 namespace equipoise::app {
 
 const std::array<const char*, 6> kFaceNames{"+x", "+y", "+z", "-x", "-y", "-z"};
 
 namespace {
-
-template <class... Args>
-std::string format(const char* text, Args... args) {
-  char out[200];
-  std::snprintf(out, sizeof out, text, args...);
-  return out;
-}
 
 // An MPU-9250 at 92 Hz has 0.1 deg/s of noise (data sheet: 0.01 deg/s/sqrt(Hz)); a hand shakes several.
 constexpr double kStillSigma_rad_s = 0.4 * kPi / 180.0;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/cli/text.hpp"
+
 namespace equipoise::app {
 namespace {
 
@@ -17,13 +19,6 @@ constexpr double kMaxBodyRate_rad_s = 3.0;
 constexpr int kStroke_ticks = 12;  // 60 ms
 constexpr double kSureSigmas = 6.0;
 constexpr double kSureAngle = 0.8;  // cosine between kick and a wheel's axis
-
-template <class... Args>
-std::string format(const char* text, Args... args) {
-  char out[240];
-  std::snprintf(out, sizeof out, text, args...);
-  return out;
-}
 
 Vec3 gyro_of(const RawSample& raw, const Calibration& c) {
   return c.R_BS * (c.gyro_rad_s_per_count * Eigen::Map<const Vec3>(raw.gyro_counts));

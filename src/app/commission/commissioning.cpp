@@ -49,8 +49,8 @@ bool ask_person(const Request& request, std::string* answer) {
 }  // namespace
 
 void add_options(Subcommand command, CommissioningArguments* a) {
-  command.option("--config", a->config, "robot configuration, TOML").required();
-  command.option("--board", a->board, "wiring, TOML; see config/boards").required();
+  command.option("--config", a->config, "robot configuration, TOML").file().required();
+  command.option("--board", a->board, "wiring, TOML; see config/boards").file().required();
   command.option("--backend", a->backend, "board, or stand: a simulated robot to practise on")
       .show_default()
       .one_of({"board", "stand"});

@@ -5,12 +5,11 @@
 #include <cstring>
 
 #include "app/cli/interrupt.hpp"
+#include "app/commission/self_test.hpp"
 #include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {
 namespace {
-
-constexpr int kMayMiss = 4;  // samples in a row, as in the self-test
 
 std::string missing_of(const RawSample& raw) {
   if (!imu_ok(raw)) return "the IMU delivers no valid sample";

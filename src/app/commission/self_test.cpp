@@ -7,7 +7,6 @@ namespace equipoise::app {
 namespace {
 
 constexpr int kTicks = 40;
-constexpr int kMayMiss = 4;  // the first samples after power-up, a late edge
 
 std::string imu_complaint(std::uint32_t health) {
   if ((health & RIO_IMU_LATE) != 0) return "the IMU's data-ready edges do not come; check [imu] interrupt";

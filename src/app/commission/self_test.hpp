@@ -8,6 +8,8 @@
 
 namespace equipoise::app {
 
+inline constexpr int kMayMiss = 4;  // samples: the first after power-up, a late edge
+
 std::string self_test(const rio_t& io);
 
 }  // namespace equipoise::app

@@ -1,6 +1,7 @@
 #include "app/commission/simulated_stand.hpp"
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 
@@ -79,7 +80,10 @@ void SimulatedStand::put_face_up(int face) {
   Vec3 up_S = Vec3::Zero();
   up_S(face % 3) = face < 3 ? 1.0 : -1.0;
   const Vec3 up_B = setup_.calibration.R_BS * up_S;
-  world_->put(Eigen::Quaterniond::FromTwoVectors(up_B, Vec3::UnitZ()).toRotationMatrix());
+  const Vec3 across = up_B.cross(Vec3::UnitZ());
+  const double angle = std::atan2(across.norm(), up_B.z());
+  const Vec3 axis = across.isZero() ? Vec3(Vec3::UnitX()) : Vec3(across.normalized());
+  world_->put(Eigen::AngleAxisd(angle, axis).toRotationMatrix());
 }
 
 Ask SimulatedStand::ask() {

@@ -40,7 +40,7 @@ class MbbrController {
         estimators_(config.estimators),
         reference_(config.reference),
         feedback_(feedback),
-        yaw_step_(config.reference.max_yaw_acceleration_rad_s2 * kTickS) {
+        yaw_step_(config.reference.yaw_acceleration_rad_s2() * kTickS) {
     for (int k = 0; k < 40; ++k) estimators_.update(sample({}), Vec3::Zero(), true);
     reference_.reset(estimators_.update(sample({}), Vec3::Zero(), true));
     command_.arm = true;

@@ -4,8 +4,9 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
+#include "app/cli/version.hpp"
 #include "app/doctor/doctor.hpp"
-#include "app/run/firmware.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -66,14 +67,17 @@ int run_doctor(const Arguments& a) {
 }  // namespace
 
 void add_doctor(Subcommand app) {
-  const Subcommand command = app.subcommand(
-      "doctor", "Finds what keeps this machine from flying a robot, and the command that mends it");
+  const Subcommand command =
+      app.subcommand("doctor",
+                     "Finds what keeps this machine from running a robot, and the command that mends it")
+          .example("equipoise doctor --board board.toml");
   auto a = std::make_shared<Arguments>();
-  command.option("--board", a->board, "wiring, TOML: also look at everything it names");
-  command.option("--command-key", a->key, "also look at this key file of run and send");
-  command.option("--json", a->json, "findings as JSON, - for stdout");
-  command.option("--report", a->report, "everything a helper needs, as text, into this file");
-  command.option("--root", a->root, "look at /sys, /proc and /dev below this directory, e.g. of a test");
+  command.option("--board", a->board, "wiring, TOML: also look at everything it names").file();
+  command.option("--command-key", a->key, "also look at this key file of run and send").file();
+  command.option("--json", a->json, "findings as JSON, - for stdout").file();
+  command.option("--report", a->report, "everything a helper needs, as text, into this file").file();
+  command.option("--root", a->root, "look at /sys, /proc and /dev below this directory, e.g. of a test")
+      .file();
   command.action([=] { return run_doctor(*a); });
 }
 

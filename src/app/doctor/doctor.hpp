@@ -1,4 +1,4 @@
-// What keeps this machine from flying a robot: kernel, device tree, pins, chips, permissions, limits.
+// What keeps this machine from running a robot: kernel, device tree, pins, chips, permissions, limits.
 // In: file system root ("" is the machine), board file, key -> out: findings, each with the command that
 // mends it. Changes nothing on the machine but reads of the IMU's identity. Start-up only.
 #pragma once

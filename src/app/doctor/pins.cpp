@@ -19,7 +19,7 @@
 namespace equipoise::app::doctor {
 namespace {
 
-constexpr const char* kOurs = "equipoise";  // as the drivers sign their requests
+constexpr const char* kSignature = "equipoise";  // as the drivers sign their requests
 
 struct Line {
   std::string use;  // "motor 1 in1"
@@ -79,7 +79,7 @@ void examine_line(const Patient& patient, Findings* findings, const Line& line) 
     return;
   }
   const std::string holder = holder_of(device, line.line);
-  if (holder == kOurs) {
+  if (holder == kSignature) {
     findings->warn(name, line.use + ": held by a running equipoise", "sudo systemctl stop equipoise");
   } else if (line.use.rfind("[leds]", 0) == 0 &&
              access(patient.path("/sys/class/leds/" + holder).c_str(), F_OK) == 0 && !holder.empty()) {

@@ -5,21 +5,23 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
 #include <memory>
 #include <vector>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
+#include "app/cli/progress.hpp"
 #include "app/io/plant_backend.hpp"
 #include "app/run/firmware.hpp"
 #include "app/run/realtime_session.hpp"
 #include "equipoise/runtime/loop.hpp"
+#include "equipoise/runtime/recorded_samples.hpp"
 
 namespace equipoise::app {
 namespace {
 
-struct Arguments {
+struct BenchArguments {
   std::string config = "config/mbbr.toml";
   std::string json;
   int ticks = 2000;
@@ -53,27 +55,9 @@ class Instructions {
   int fd_ = -1;
 };
 
-/// Plays samples to the loop; motor commands go nowhere.
-class Recording {
- public:
-  int wait_tick(std::int64_t* now_ns) noexcept {
-    if (next_ == samples.size()) return -ESHUTDOWN;
-    *now_ns = samples[next_].t_ns;
-    return 0;
-  }
-  RawSample read() noexcept { return samples[next_++]; }
-  int write(const MotorCommand& /*command*/) noexcept { return 0; }
-  int motors_off() noexcept { return 0; }
-
-  std::vector<RawSample> samples;
-
- private:
-  std::size_t next_ = 0;
-};
-
 /// Samples of a short run, then loop and pipeline alone on them.
 template <class Firmware>
-nlohmann::json bench_tick(const Arguments& a) {
+nlohmann::json bench_tick(const BenchArguments& a) {
   Choice choice;
   complete<Firmware>(choice);
   choice.fidelity = "nominal";
@@ -84,7 +68,7 @@ nlohmann::json bench_tick(const Arguments& a) {
     return command;
   };
   std::atomic<bool> done{false};
-  Recording recording;
+  runtime::RecordedSamples recording;
   recording.samples.reserve(static_cast<std::size_t>(a.ticks));
   auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);
   PlantBackend backend(world);
@@ -128,7 +112,7 @@ nlohmann::json quantiles(std::vector<std::int64_t> late_ns) {
 }
 
 /// Ours and a bare loop take turns, so that both meet the same neighbours.
-nlohmann::json bench_wake(const Arguments& a) {
+nlohmann::json bench_wake(const BenchArguments& a) {
   constexpr std::int64_t kPeriod_ns = 5'000'000;
   const int turn = std::min(a.wakes, 40);
   runtime::HeartbeatPage page{};
@@ -137,7 +121,9 @@ nlohmann::json bench_wake(const Arguments& a) {
   std::vector<std::int64_t> bare;
   for (auto* late : {&ours, &bare}) late->reserve(2 * static_cast<std::size_t>(a.wakes));
   std::int64_t due_ns = runtime::monotonic_now_ns() + kPeriod_ns;
+  Progress progress("bench");
   for (int i = 0; i < 2 * a.wakes; ++i) {
+    progress.at(0.5 * i / a.wakes);
     const bool is_ours = i / turn % 2 == 0;
     runtime::sleep_until(due_ns);
     const std::int64_t now_ns = runtime::monotonic_now_ns();
@@ -154,7 +140,7 @@ nlohmann::json bench_wake(const Arguments& a) {
   return {{"loop", quantiles(ours)}, {"clock_nanosleep", quantiles(bare)}};
 }
 
-int run(const Arguments& a) {
+int run(const BenchArguments& a) {
   nlohmann::json out = with_robot(robot_type(a.config), a.config,
                                   [&](auto firmware) { return bench_tick<decltype(firmware)>(a); });
   {
@@ -176,12 +162,14 @@ int run(const Arguments& a) {
 }  // namespace
 
 void add_bench(Subcommand app) {
-  const Subcommand command = app.subcommand("bench", "cost of a tick, punctuality of wake-ups");
-  auto a = std::make_shared<Arguments>();
-  command.option("--config", a->config, "robot configuration").show_default();
+  const Subcommand command =
+      app.subcommand("bench", "Measures the cost of a tick and the punctuality of wake-ups")
+          .example("equipoise bench --config config/mbbr.toml");
+  auto a = std::make_shared<BenchArguments>();
+  command.option("--config", a->config, "robot configuration").file().show_default();
   command.option("--ticks", a->ticks, "to time").show_default().range(200, 1000000);
   command.option("--wakes", a->wakes, "of 5 ms, each way").show_default().range(10, 100000);
-  command.option("--json", a->json, "results as JSON, - for stdout");
+  command.option("--json", a->json, "results as JSON, - for stdout").file();
   command.action([=] { return run(*a); });
 }
 

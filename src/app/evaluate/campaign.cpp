@@ -1,37 +1,58 @@
 // `equipoise campaign`: every fault in every phase of a run, and the soak; docs/reliability.md from it.
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <random>
+#include <utility>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
 #include "app/cli/reasons.hpp"
 #include "app/evaluate/fault_run.hpp"
+#include "app/evaluate/parallel.hpp"
+#include "config/population.hpp"
 
 namespace equipoise::app {
 namespace {
 
-struct Arguments {
+struct CampaignArguments {
   std::string config;
   std::string json;
   std::string markdown;
+  std::string fidelity = "nominal";
+  std::vector<std::string> set;
+  std::vector<std::string> faults;  // empty: all
+  std::vector<std::string> phases;
   int seeds = 1;
+  int robots = 1;
+  std::int64_t robot = 0;  // the first
   double soak_h = 0.0;
   std::uint64_t seed = 1;
+  int jobs = 0;
 };
 
 struct Soak {
   double hours = 0.0;
-  std::int64_t flights = 0;
+  std::int64_t runs = 0;
   std::int64_t disarmed = 0;
   std::int64_t unexplained = 0;
   std::int64_t unsafe = 0;
   nlohmann::json to_explain = nlohmann::json::array();  // runs that are unsafe or ended without a fault
 };
 
+/// One row of the table of cases.
+struct Case {
+  FaultPlan plan;
+  std::int64_t robot = 0;
+  std::uint64_t seed = 0;
+};
+
 template <class Firmware>
-FaultOutcome one(const typename Firmware::Config& config, const FaultPlan& plan, std::uint64_t seed) {
-  auto world = Firmware::world(config, fidelity_level("nominal"), seed);
+FaultOutcome one(const typename Firmware::Config& config, const std::string& fidelity, const FaultPlan& plan,
+                 std::uint64_t seed) {
+  auto world = Firmware::world(config, fidelity_level(fidelity), seed);
   return Firmware::with_pipeline(config, Firmware::kDefaultController, [&](auto& pipeline) {
     const auto unrecorded = [](const auto&...) {};
     return run_with_fault(world, pipeline, plan, seed, unrecorded);
@@ -51,7 +72,8 @@ int fault_tick(Phase phase) {
 
 /// Runs with a random fault each, of random kind, time and length; between faults nothing may happen.
 template <class Firmware>
-Soak soak(const typename Firmware::Config& config, double hours, std::uint64_t seed) {
+Soak soak(const typename Firmware::Config& config, const std::string& fidelity, double hours,
+          std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   const auto pick = [&engine](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(engine);
@@ -67,9 +89,9 @@ Soak soak(const typename Firmware::Config& config, double hours, std::uint64_t s
     plan.fault_ticks = pick(1, 200);
     plan.end_tick = plan.fault_at_tick + pick(200, 2000);
     const std::uint64_t run_seed = engine();
-    const FaultOutcome v = one<Firmware>(config, plan, run_seed);
+    const FaultOutcome v = one<Firmware>(config, fidelity, plan, run_seed);
     ticks += plan.end_tick;
-    ++s.flights;
+    ++s.runs;
     s.disarmed += v.disarmed ? 1 : 0;
     s.unsafe += v.unsafe ? 1 : 0;
     s.unexplained += v.off_without_fault ? 1 : 0;
@@ -88,47 +110,122 @@ Soak soak(const typename Firmware::Config& config, double hours, std::uint64_t s
   return s;
 }
 
+/// The robot as it was drawn, with its default estimator and controller.
 template <class Firmware>
-int campaign(const Arguments& a) {
+typename Firmware::Config configured(const CampaignArguments& a, std::int64_t robot) {
   Choice choice;
   choice.estimator = Firmware::kDefaultEstimator;
   choice.controller = Firmware::kDefaultController;
-  choice.fidelity = "nominal";
-  const auto config = Firmware::apply(Firmware::load(a.config, {}).config, choice);
+  choice.fidelity = a.fidelity;
+  const auto drawn = config::draw_robot(a.config, a.set, a.fidelity, robot);
+  return Firmware::apply(Firmware::load(a.config, config::with_robot_drawn(drawn, a.fidelity, a.set)).config,
+                         choice);
+}
+
+bool chosen(const std::vector<std::string>& names, const char* name) {
+  return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
+}
+
+std::vector<Case> cases_of(const CampaignArguments& a) {
+  std::vector<Case> cases;
+  for (std::size_t f = 0; f < kFaults.size(); ++f) {
+    for (std::size_t p = 0; p < kPhaseNames.size(); ++p) {
+      if (!chosen(a.faults, kFaults[f].name) || !chosen(a.phases, kPhaseNames[p])) continue;
+      for (int r = 0; r < a.robots; ++r) {
+        for (int i = 0; i < a.seeds; ++i) {
+          Case c;
+          c.plan.phase = static_cast<Phase>(p);
+          c.plan.fault = static_cast<FaultKind>(f);
+          c.plan.fault_at_tick = fault_tick(c.plan.phase);
+          c.robot = a.robot + r;
+          c.seed = a.seed + static_cast<std::uint64_t>(i);
+          cases.push_back(c);
+        }
+      }
+    }
+  }
+  return cases;
+}
+
+nlohmann::json row_of(const Case& c, const FaultOutcome& v) {
+  const auto known = [](bool is, int value) { return is ? nlohmann::json(value) : nlohmann::json(nullptr); };
+  return {{"fault", kFaults[static_cast<std::size_t>(c.plan.fault)].name},
+          {"phase", kPhaseNames[static_cast<std::size_t>(c.plan.phase)]},
+          {"robot", c.robot},
+          {"seed", c.seed},
+          {"unsafe", v.unsafe},
+          {"why", v.why},
+          {"upright", v.upright},
+          {"disarmed", v.disarmed},
+          {"off_after_ticks", known(v.disarmed, v.off_after_ticks)},
+          {"found_after_ticks", known(v.found_after_ticks >= 0, v.found_after_ticks)},
+          {"degraded", degraded_names(v.degraded)},
+          {"reasons", reasons_text(v.reasons)}};
+}
+
+/// What one cell of the table says of its cases.
+std::string cell_of(const std::vector<FaultOutcome>& outcomes) {
+  int upright = 0;
+  int off = 0;
+  int unsafe = 0;
+  int latest = 0;
+  std::uint32_t reasons = 0;
+  const char* why = "";
+  for (const FaultOutcome& v : outcomes) {
+    upright += v.upright ? 1 : 0;
+    off += v.disarmed ? 1 : 0;
+    unsafe += v.unsafe ? 1 : 0;
+    latest = std::max(latest, v.disarmed ? v.off_after_ticks : 0);
+    reasons |= v.reasons;
+    if (v.unsafe) why = v.why;
+  }
+  const std::string n = outcomes.size() == 1 ? "" : "/" + std::to_string(outcomes.size());
+  if (unsafe > 0) return "**UNSAFE " + std::to_string(unsafe) + n + ": " + why + "**";
+  std::string cell;
+  if (upright > 0) cell = n.empty() ? "stays up" : std::to_string(upright) + n + " stay up";
+  if (off > 0) {
+    if (!cell.empty()) cell += "; ";
+    cell += (n.empty() ? "" : std::to_string(off) + n + " ") + "off by tick " + std::to_string(latest) +
+            ": " + reasons_text(reasons);
+  }
+  return cell.empty() ? "stays off: " + reasons_text(reasons) : cell;
+}
+
+template <class Firmware>
+int campaign(const CampaignArguments& a) {
+  std::vector<typename Firmware::Config> configs;
+  configs.reserve(static_cast<std::size_t>(a.robots));
+  for (int r = 0; r < a.robots; ++r) configs.push_back(configured<Firmware>(a, a.robot + r));
+  const std::vector<Case> all = cases_of(a);
+  const auto outcomes =
+      in_parallel<FaultOutcome>("campaign", all.size(), threads_for(a.jobs), [&](std::size_t i) {
+        const Case& c = all[i];
+        return one<Firmware>(configs[static_cast<std::size_t>(c.robot - a.robot)], a.fidelity, c.plan,
+                             c.seed);
+      });
 
   nlohmann::json cases = nlohmann::json::array();
-  std::string table = "| fault | ";
-  for (const char* phase : kPhaseNames) table += std::string(phase) + " | ";
-  table += "\n|---|---|---|---|---|---|\n";
   int unsafe = 0;
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<FaultOutcome>> cells;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    cases.push_back(row_of(all[i], outcomes[i]));
+    unsafe += outcomes[i].unsafe ? 1 : 0;
+    cells[{static_cast<std::size_t>(all[i].plan.fault), static_cast<std::size_t>(all[i].plan.phase)}]
+        .push_back(outcomes[i]);
+  }
+  std::string table = "| fault | ";
+  std::string rule = "|---|";
+  for (const char* phase : kPhaseNames) {
+    if (!chosen(a.phases, phase)) continue;
+    table += std::string(phase) + " | ";
+    rule += "---|";
+  }
+  table += "\n" + rule + "\n";
   for (std::size_t f = 0; f < kFaults.size(); ++f) {
+    if (!chosen(a.faults, kFaults[f].name)) continue;
     table += "| " + std::string(kFaults[f].name) + ": " + kFaults[f].why + " | ";
     for (std::size_t p = 0; p < kPhaseNames.size(); ++p) {
-      std::string cell;
-      for (int i = 0; i < a.seeds; ++i) {
-        FaultPlan plan;
-        plan.phase = static_cast<Phase>(p);
-        plan.fault = static_cast<FaultKind>(f);
-        plan.fault_at_tick = fault_tick(plan.phase);
-        const FaultOutcome v = one<Firmware>(config, plan, a.seed + static_cast<std::uint64_t>(i));
-        unsafe += v.unsafe ? 1 : 0;
-        cases.push_back(
-            {{"fault", kFaults[f].name},
-             {"phase", kPhaseNames[p]},
-             {"seed", a.seed + static_cast<std::uint64_t>(i)},
-             {"unsafe", v.unsafe},
-             {"why", v.why},
-             {"disarmed", v.disarmed},
-             {"off_after_ticks", v.disarmed ? nlohmann::json(v.off_after_ticks) : nlohmann::json(nullptr)},
-             {"reasons", reasons_text(v.reasons)}});
-        if (i > 0 && !v.unsafe) continue;
-        cell = v.unsafe ? "**UNSAFE: " + std::string(v.why) + "**"
-               : v.disarmed
-                   ? "off in tick " + std::to_string(v.off_after_ticks) + ": " + reasons_text(v.reasons)
-               : v.reasons != 0 ? "stays off: " + reasons_text(v.reasons)
-                                : "flies on";
-      }
-      table += cell + " | ";
+      if (chosen(a.phases, kPhaseNames[p])) table += cell_of(cells[{f, p}]) + " | ";
     }
     table += "\n";
   }
@@ -137,16 +234,19 @@ int campaign(const Arguments& a) {
   std::string summary =
       std::to_string(cases.size()) + " fault x phase cases, " + std::to_string(unsafe) + " unsafe";
   if (a.soak_h > 0.0) {
-    const Soak s = soak<Firmware>(config, a.soak_h, a.seed);
-    out["soak"] = {{"hours", s.hours},   {"flights", s.flights},         {"disarmed", s.disarmed},
-                   {"unsafe", s.unsafe}, {"unexplained", s.unexplained}, {"to_explain", s.to_explain}};
+    const Soak s = soak<Firmware>(configs[0], a.fidelity, a.soak_h, a.seed);
+    out["soak"] = {{"hours", s.hours},
+                   {"runs", s.runs},
+                   {"disarmed", s.disarmed},
+                   {"unsafe", s.unsafe},
+                   {"unexplained", s.unexplained},
+                   {"to_explain", s.to_explain}};
     char line[200];
     std::snprintf(line, sizeof line,
-                  "; soak %.2f h of robot time, %lld flights, %lld disarmed by a fault, %lld unsafe, "
+                  "; soak %.2f h of robot time, %lld runs, %lld disarmed by a fault, %lld unsafe, "
                   "%lld without a cause",
-                  s.hours, static_cast<long long>(s.flights),
-                  static_cast<long long>(s.disarmed - s.unexplained), static_cast<long long>(s.unsafe),
-                  static_cast<long long>(s.unexplained));
+                  s.hours, static_cast<long long>(s.runs), static_cast<long long>(s.disarmed - s.unexplained),
+                  static_cast<long long>(s.unsafe), static_cast<long long>(s.unexplained));
     summary += line;
     unsafe += static_cast<int>(s.unsafe + s.unexplained);
   }
@@ -164,16 +264,26 @@ int campaign(const Arguments& a) {
 
 void add_campaign(Subcommand app) {
   const Subcommand command =
-      app.subcommand("campaign", "break every part in every phase of a run, in simulated time");
-  auto a = std::make_shared<Arguments>();
-  command.option("--config", a->config, "robot configuration").required();
+      app.subcommand("campaign", "Breaks every part in every phase of a run, in simulated time")
+          .example("equipoise campaign --config config/mbbr.toml --seeds 3 --fault imu_off");
+  auto a = std::make_shared<CampaignArguments>();
+  command.option("--config", a->config, "robot configuration").file().required();
   command.option("--seeds", a->seeds, "runs per case").show_default().range(1, 1000);
   command.option("--seed", a->seed, "the first").show_default();
+  command.option("--fidelity", a->fidelity, "of the world").show_default();
+  command.option("--robot", a->robot, "of the population, the first; 0: the typical one").show_default();
+  command.option("--robots", a->robots, "of the population").show_default().range(1, 100000);
+  command.option("--fault", a->faults, "only these");
+  command.option("--phase", a->phases, "only these");
+  command.option("--set", a->set, "override a configuration key");
+  command.option("--jobs", a->jobs, "threads; 0: one per core. The results do not depend on it")
+      .show_default()
+      .range(0, 1024);
   command.option("--soak-hours", a->soak_h, "then random runs, hours of robot time")
       .show_default()
       .range(0.0, 10000.0);
-  command.option("--markdown", a->markdown, "table for docs/reliability.md");
-  command.option("--json", a->json, "cases as JSON, - for stdout");
+  command.option("--markdown", a->markdown, "table for docs/reliability.md").file();
+  command.option("--json", a->json, "cases as JSON, - for stdout").file();
   command.action([=] {
     return with_robot(robot_type(a->config), a->config,
                       [&](auto firmware) { return campaign<decltype(firmware)>(*a); });

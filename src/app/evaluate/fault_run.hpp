@@ -1,7 +1,8 @@
 // One run with one injected fault through the production loop and supervisor, and whether it was safe. In:
-// world, pipeline, phase, fault, seed -> out: what the motors did. Unsafe: duty after the fault's deadline,
-// duty on a robot that lies, an estimate that is wrong while motors run, motors off without a reason, motors
-// on again by themselves. The observer gets every tick. Simulation only.
+// world, pipeline, phase, fault, seed -> out: what the motors and the robot did. Judged in every tick from
+// the plant's truth. Unsafe: duty after the fault's deadline, duty on a robot that lies, faster than 0.6 m/s
+// or half a metre further than asked with motors on, an estimate that is wrong while motors run, motors off
+// without a reason, motors on again by themselves. The observer gets every tick. Simulation only.
 #pragma once
 
 #include <cmath>
@@ -16,16 +17,20 @@
 
 namespace equipoise::app {
 
-enum class Phase : std::size_t { kDisarmed, kArming, kBalancing, kSpinning, kDriving, kCount };
+enum class Phase : std::size_t { kDisarmed, kArming, kBalancing, kSpinning, kDriving, kSpinDriving, kCount };
 inline constexpr std::array<const char*, static_cast<std::size_t>(Phase::kCount)> kPhaseNames{
-    "disarmed", "arming", "balancing", "spinning", "driving"};
+    "disarmed", "arming", "balancing", "spinning", "driving", "spin_driving"};
 
 struct FaultOutcome {
   bool unsafe = false;
   const char* why = "";
-  bool disarmed = false;      // motors went off
-  int off_after_ticks = -1;   // of the fault
-  std::uint32_t reasons = 0;  // when they went off, or why they never went on
+  bool upright = false;      // at the end, armed
+  bool disarmed = false;     // motors went off
+  int off_after_ticks = -1;  // of the fault
+  int found_after_ticks =
+      -1;  // off, or the faulty part left out (a degraded mode of its own), after the fault
+  std::uint32_t degraded = 0;  // since the fault
+  std::uint32_t reasons = 0;   // when they went off, or why they never went on
   bool off_without_fault = false;
 };
 
@@ -33,7 +38,7 @@ struct FaultPlan {
   Phase phase = Phase::kBalancing;
   FaultKind fault = FaultKind::kImuOff;
   int fault_at_tick = 500;
-  int fault_ticks = 1 << 20;
+  int fault_ticks = 1 << 20;  // at most; kFaults has the length of some
   int end_tick = 1100;
 };
 
@@ -42,8 +47,9 @@ constexpr int kArmTick = 100;
 inline Command command_in(Phase phase, int tick) {
   Command command;
   command.arm = phase != Phase::kDisarmed && tick >= kArmTick;
-  if (tick > kArmTick + 100 && phase == Phase::kSpinning) command.yaw_rate_rad_s = 2.0 * kPi;
-  if (tick > kArmTick + 100 && phase == Phase::kDriving) command.velocity_W_m_s = Vec2(0.1, 0.0);
+  const bool both = phase == Phase::kSpinDriving;
+  if (tick > kArmTick + 100 && (both || phase == Phase::kSpinning)) command.yaw_rate_rad_s = 2.0 * kPi;
+  if (tick > kArmTick + 100 && (both || phase == Phase::kDriving)) command.velocity_W_m_s = Vec2(0.1, 0.0);
   return command;
 }
 
@@ -62,6 +68,12 @@ class FaultJudge {
     const FaultInfo& info = kFaults[static_cast<std::size_t>(plan_.fault)];
     const int since = static_cast<int>(tick) - plan_.fault_at_tick;  // 0: the first spoilt tick
     const bool on = t.motors.enable;
+    const bool armed = t.arm_state == ArmState::kArmed;  // for a tick it may let go
+    moved(since, command, on, truth.position_W_m);
+    if (since >= 0) outcome_.degraded |= t.degraded;
+    if (since >= 0 && outcome_.found_after_ticks < 0 && (t.degraded & kSensorsLeftOut) != 0)
+      outcome_.found_after_ticks = since + 1;
+    outcome_.upright = armed && truth.theta_rad.head<2>().norm() < max_tilt_rad_;
     lying_ = on && truth.theta_rad.head<2>().norm() > max_tilt_rad_ ? lying_ + 1 : 0;
     const double error = (seen.theta_rad - truth.theta_rad).head<2>().norm();
     wrong_ = on && !(error < kWrongTilt_rad) ? wrong_ + 1 : 0;
@@ -72,15 +84,16 @@ class FaultJudge {
     if (on && outcome_.disarmed) unsafe("armed again by itself");
     if (on && !command.arm) unsafe("motors on unasked");
     if (!on && t.reasons == 0) unsafe("motors off without a reason");
-    if (was_on_ && !on) {
+    if (was_on_ && !armed) {
       outcome_.disarmed = true;
+      if (outcome_.found_after_ticks < 0) outcome_.found_after_ticks = since + 1;
       outcome_.off_after_ticks = since + 1;
       outcome_.reasons = t.reasons;
       outcome_.off_without_fault = since < 0;
     } else if (!was_on_ && !outcome_.disarmed) {
       outcome_.reasons = t.reasons;
     }
-    was_on_ = on;
+    was_on_ = armed;
   }
 
   FaultOutcome outcome() const {
@@ -91,6 +104,21 @@ class FaultJudge {
 
  private:
   static constexpr double kWrongTilt_rad = 0.35;
+  static constexpr double kTooFast_m_s = 0.6;
+  static constexpr double kUnasked_m = 0.5;
+
+  /// Speed and travel since the fault.
+  void moved(int since, const Command& command, bool on, const Vec2& position_W_m) {
+    if (since <= 0) {
+      from_W_m_ = position_W_m;
+    } else {
+      asked_m_ += kTickS * command.velocity_W_m_s.norm();
+      if (on && (position_W_m - position_W_m_).norm() > kTickS * kTooFast_m_s) unsafe("too fast");
+      if (on && (position_W_m - from_W_m_).norm() > asked_m_ + kUnasked_m) unsafe("unasked travel");
+    }
+    position_W_m_ = position_W_m;
+  }
+
   void unsafe(const char* why) {
     if (!outcome_.unsafe) outcome_.why = why;
     outcome_.unsafe = true;
@@ -103,6 +131,9 @@ class FaultJudge {
   bool struck_while_on_ = false;
   int lying_ = 0;
   int wrong_ = 0;
+  Vec2 position_W_m_ = Vec2::Zero();
+  Vec2 from_W_m_ = Vec2::Zero();  // where the fault struck
+  double asked_m_ = 0.0;          // of way since then
 };
 
 /// `observe(tick, now_ns, raw, command, result)` as of the loop.
@@ -128,7 +159,8 @@ FaultOutcome run_with_fault(World& world, Pipeline& pipeline, const FaultPlan& p
     judge.judge(tick, command, t, faulty.active(), view(t.x_hat, robot), view(world.truth(), robot));
     observe(tick, now_ns, raw, command, t);
     if (tick + 1 == plan.fault_at_tick) {
-      faulty.start(plan.fault, plan.fault_ticks);
+      const int lasts = kFaults[static_cast<std::size_t>(plan.fault)].ticks;
+      faulty.start(plan.fault, lasts > 0 ? lasts : plan.fault_ticks);
       judge.strike();
     }
     done = tick + 1 >= plan.end_tick;

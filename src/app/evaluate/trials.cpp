@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
 #include "app/evaluate/parallel.hpp"
-#include "app/sim/simulate.hpp"
-#include "config/population.hpp"
+#include "app/sim/sim_job.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -18,84 +18,70 @@ struct Arguments {
   int jobs = 0;
 };
 
-struct Trial {
-  std::int64_t robot = 0;
-  SimOptions options;
-  Choice choice{"", "", "full", false, "dmp", ""};
-  double yaw_hz = 0.0;
-};
-
 template <class Value>
 void take(const nlohmann::json& row, const char* key, Value* value) {
   if (row.contains(key)) row.at(key).get_to(*value);
 }
 
-Trial trial_of(const nlohmann::json& row) {
+/// A row of the input: its own keys, and the world of robots as built where it names none.
+SimRequest request_of(const Arguments& a, const nlohmann::json& row) {
   static const std::vector<std::string> kKeys{"robot",      "seed",     "yaw_hz",    "drive_mps",
                                               "duration_s", "fidelity", "estimator", "controller"};
   for (const auto& [key, value] : row.items()) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
       throw InputError("trials: \"" + key + "\" is not a key of a trial");
   }
-  Trial t;
-  take(row, "robot", &t.robot);
-  take(row, "seed", &t.options.seed);
-  take(row, "yaw_hz", &t.yaw_hz);
-  take(row, "drive_mps", &t.options.drive_mps);
-  take(row, "duration_s", &t.options.duration_s);
-  take(row, "fidelity", &t.choice.fidelity);
-  take(row, "estimator", &t.choice.estimator);
-  take(row, "controller", &t.choice.controller);
-  if (t.robot < 0) throw InputError("trials: robot must not be negative");
-  if (!(t.options.duration_s > 0.0 && t.options.duration_s <= 360000.0) || !(std::abs(t.yaw_hz) <= 5.0) ||
-      !(std::abs(t.options.drive_mps) <= 2.0))
-    throw InputError("trials: duration_s, yaw_hz or drive_mps is out of range");
-  t.options.yaw_rate_rad_s = 2.0 * kPi * t.yaw_hz;
-  return t;
+  SimRequest r;
+  r.config = a.config;
+  r.set = a.set;
+  r.choice.fidelity = "full";
+  double yaw_hz = 0.0;
+  take(row, "robot", &r.robot);
+  take(row, "seed", &r.seed);
+  take(row, "yaw_hz", &yaw_hz);
+  take(row, "drive_mps", &r.drive_mps);
+  take(row, "duration_s", &r.duration_s);
+  take(row, "fidelity", &r.choice.fidelity);
+  take(row, "estimator", &r.choice.estimator);
+  take(row, "controller", &r.choice.controller);
+  r.yaw_rate_rad_s = 2.0 * kPi * yaw_hz;
+  check(r);
+  return r;
 }
 
 template <class Firmware>
-nlohmann::json run(const Arguments& a, Trial t) {
-  complete<Firmware>(t.choice);
-  const auto drawn = config::draw_robot(a.config, a.set, t.choice.fidelity, t.robot);
-  const auto loaded = Firmware::load(a.config, config::with_robot_drawn(drawn, t.choice.fidelity, a.set));
+nlohmann::json run(SimRequest r) {
+  std::vector<config::Drawn> drawn;
+  const auto loaded = load_for<Firmware>(&r, &drawn);
   const std::atomic<bool> stop{false};
-  const SimSummary s = simulate<Firmware>(loaded.config, t.choice, t.options, {}, stop);
+  const SimOptions options = options_for<Firmware>(r, loaded.config);
   nlohmann::json imperfections = nlohmann::json::object();
   for (const config::Drawn& d : drawn) {
     for (std::size_t i = 0; i < d.values.size(); ++i)
       imperfections[d.values.size() == 1 ? d.key : d.key + "[" + std::to_string(i) + "]"] = d.values[i];
   }
-  nlohmann::json row{{"robot", t.robot},
-                     {"seed", t.options.seed},
-                     {"yaw_hz", t.yaw_hz},
-                     {"drive_mps", t.options.drive_mps},
-                     {"duration_s", t.options.duration_s},
-                     {"fidelity", t.choice.fidelity},
-                     {"attitude_rmse_rad", s.controlling.attitude_rmse_rad},
-                     {Firmware::kSpeedRmseKey, s.controlling.speed_rmse},
-                     {"yaw_frame_speed_rmse_m_s", s.yaw_frame_speed_rmse_m_s},
-                     {"heading_error_rad", s.heading_error_rad},
-                     {"position_rmse_m", s.position_rmse_m},
-                     {"yaw_rate_mean_hz", s.yaw_rate_mean_hz},
-                     {"duty_max", s.duty_max},
-                     {"saturated_fraction", s.saturated_fraction},
-                     {"drawn", imperfections}};
-  s.verdict.write(&row);
+  nlohmann::json row = figures<Firmware>(simulate<Firmware>(loaded.config, r.choice, options, {}, stop));
+  row.update({{"robot", r.robot},
+              {"seed", r.seed},
+              {"yaw_hz", r.yaw_rate_rad_s / (2.0 * kPi)},
+              {"drive_mps", r.drive_mps},
+              {"duration_s", r.duration_s},
+              {"fidelity", r.choice.fidelity},
+              {"drawn", imperfections}});
   return row;
 }
 
 template <class Firmware>
 int run_all(const Arguments& a) {
   const nlohmann::json in = read_json(a.in);
-  std::vector<Trial> trials;
+  std::vector<SimRequest> trials;
   try {
-    for (const nlohmann::json& row : in.at("trials")) trials.push_back(trial_of(row));
+    for (const nlohmann::json& row : in.at("trials")) trials.push_back(request_of(a, row));
   } catch (const nlohmann::json::exception& error) {
     throw InputError(a.in + ": " + error.what());
   }
-  const auto rows = in_parallel<nlohmann::json>(trials.size(), threads_for(a.jobs),
-                                                [&](std::size_t i) { return run<Firmware>(a, trials[i]); });
+  const auto rows = in_parallel<nlohmann::json>("trials", trials.size(), threads_for(a.jobs),
+                                                [&](std::size_t i) { return run<Firmware>(trials[i]); });
   write_json({{"robot", Firmware::kName}, {"version", version()}, {"trials", rows}}, a.json);
   return 0;
 }
@@ -104,16 +90,17 @@ int run_all(const Arguments& a) {
 
 void add_trials(Subcommand app) {
   const Subcommand command =
-      app.subcommand("trials", "simulate many runs of drawn robots, without logs, on all cores");
+      app.subcommand("trials", "Simulates many runs of drawn robots, without logs, on all cores")
+          .example("equipoise trials --config config/mbbr.toml --in trials.json --json results.json");
   auto a = std::make_shared<Arguments>();
-  command.option("--config", a->config, "robot configuration, TOML").required();
+  command.option("--config", a->config, "robot configuration, TOML").file().required();
   command
       .option("--in", a->in,
               "JSON: {\"trials\": [{robot, seed, yaw_hz, drive_mps, duration_s, fidelity, estimator, "
               "controller}, "
               "...]}, each key optional")
       .required();
-  command.option("--json", a->json, "results in the same order, - for stdout").show_default();
+  command.option("--json", a->json, "results in the same order, - for stdout").file().show_default();
   command.option("--set", a->set, "override a configuration key in every trial");
   command.option("--jobs", a->jobs, "threads; 0: one per core. The results do not depend on it")
       .show_default()

@@ -129,11 +129,12 @@ int run(const Arguments& a) {
 
 void add_guard(Subcommand app) {
   const Subcommand command =
-      app.subcommand("guard", "stop the motors when the loop is dead, stopped or hanging");
+      app.subcommand("guard", "Stops the motors when the loop is dead, stopped or hanging")
+          .example("equipoise guard --board board.toml");
   auto a = std::make_shared<Arguments>();
   command.option("--heartbeat-fd", a->heartbeat_fd, "descriptor of the page on which the loop beats")
       .required();
-  command.option("--board", a->board, "wiring, TOML: the bridges to hold; see config/boards");
+  command.option("--board", a->board, "wiring, TOML: the bridges to hold; see config/boards").file();
   command.option("--enable", a->enable, "value file of the bridge enable line: 1 awake, 0 asleep");
   command.option("--pwm", a->pwm, "duty_cycle file of each motor's PWM channel, instead of --board");
   command.option("--period-ms", a->period_ms, "the loop's tick").show_default().range(0.5, 1000.0);

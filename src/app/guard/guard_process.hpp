@@ -1,4 +1,4 @@
-// The guard of one flight: a child process that holds the bridge enables of a board and its heartbeat page.
+// The guard of one run: a child process that holds the bridge enables of a board and its heartbeat page.
 // In: board file -> out: the page to beat on; runtime_error when it does not come up. It ends with this
 // process, whatever ends that. Start-up only; create it before threads, and before the board is opened.
 #pragma once

@@ -44,6 +44,7 @@ void write_bench_log(const std::string& path, const BenchLog& log) {
   bench_t message{};
   message.bridge = static_cast<std::int32_t>(log.bridge);
   message.axis = log.axis;
+  message.radius_ratio = log.radius_ratio;
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
   for (const BenchSample& row : log.rows) {
     message.utime = std::llround(row.t_s * 1e6);
@@ -81,6 +82,7 @@ BenchLog read_lcm(const std::string& path) {
     }
     if (log.rows.empty()) {
       log.axis = message.axis;
+      log.radius_ratio = message.radius_ratio;
       log.bridge = message.bridge == 1   ? LoggedBridge::kDriveBrake
                    : message.bridge == 2 ? LoggedBridge::kDriveCoast
                                          : LoggedBridge::kUnknown;

@@ -3,6 +3,7 @@
 // In: samples -> out: file, and back. InputError names the file and what is wrong with it. Not RT-safe.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,8 @@ enum class LoggedBridge : int { kUnknown = 0, kDriveBrake = 1, kDriveCoast = 2 }
 
 struct BenchLog {
   LoggedBridge bridge = LoggedBridge::kUnknown;
-  int axis = 0;  // 0 motor, 1 ball about x, 2 about y
+  int axis = 0;                                                    // 0 motor, 1 ball about x, 2 about y
+  double radius_ratio = std::numeric_limits<double>::quiet_NaN();  // flywheel over ball; NaN: nobody said
   std::vector<BenchSample> rows;
 };
 

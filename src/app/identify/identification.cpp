@@ -233,10 +233,16 @@ Identified identify_motor(const BenchLog& log, double inertia_kg_m2) {
   return out;
 }
 
-Identified identify_friction(const BenchLog& log, const FrictionRig& rig) {
+Identified identify_friction(const BenchLog& log, const FrictionRig& asked) {
   Identified out;
   out.refused = unusable(log, false);
   if (!out.refused.empty()) return out;
+  FrictionRig rig = asked;
+  if (std::isnan(rig.flywheel_over_ball_radius)) rig.flywheel_over_ball_radius = log.radius_ratio;
+  if (!(rig.flywheel_over_ball_radius > 0.0)) {
+    out.refused = "does not say the flywheel's radius over the ball's; give it by --radius-ratio";
+    return out;
+  }
   const double least = rig.stribeck ? kCreeping_rad_s : kMoving_rad_s;  // of the ball
   const std::vector<Window> windows = windows_in_motion(log, least / rig.flywheel_over_ball_radius);
   if (windows.size() < kMinSamples) {

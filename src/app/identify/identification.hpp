@@ -38,7 +38,7 @@ Identified identify_motor(const BenchLog& log, double inertia_kg_m2);
 struct FrictionRig {
   double k1_N_m = 0.176;
   double k2_ball_N_m_s = 0.011;
-  double flywheel_over_ball_radius = 1.0;  // r_f / r
+  double flywheel_over_ball_radius = std::numeric_limits<double>::quiet_NaN();  // r_f / r; NaN: the log's
   bool separate_directions = false;
   bool stribeck = false;
 };

@@ -4,13 +4,14 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
 #include "app/identify/identification.hpp"
 #include "equipoise/config.hpp"
 
 namespace equipoise::app {
 namespace {
 
-struct Arguments {
+struct IdentifyArguments {
   std::string log;
   std::string out;
   std::string json;
@@ -25,7 +26,7 @@ struct Keys {
 };
 
 /// Only what the data determine goes into the fragment; the rest is said in comments.
-void write_fragment(const Arguments& a, const Keys& wanted, const Identified& found) {
+void write_fragment(const IdentifyArguments& a, const Keys& wanted, const Identified& found) {
   std::ofstream file(a.out);
   file.precision(5);
   file << "# Identified from " << a.log << "; name it in the configuration: include = [\"" << a.out
@@ -59,7 +60,7 @@ void print(const Identified& found, std::FILE* out) {
   std::fprintf(out, "\n");
 }
 
-nlohmann::json to_json(const Arguments& a, const Identified& found) {
+nlohmann::json to_json(const IdentifyArguments& a, const Identified& found) {
   nlohmann::json estimates = nlohmann::json::object();
   for (const Estimate& e : found.estimates) {
     const bool bounded = std::isfinite(e.half_width);
@@ -72,7 +73,7 @@ nlohmann::json to_json(const Arguments& a, const Identified& found) {
   return json;
 }
 
-int report(const Arguments& a, const Identified& found, const Keys& wanted) {
+int report(const IdentifyArguments& a, const Identified& found, const Keys& wanted) {
   if (!found.refused.empty()) throw InputError(a.log + ": " + found.refused);
   print(found, a.json == "-" ? stderr : stdout);
   if (!a.out.empty()) write_fragment(a, wanted, found);
@@ -80,14 +81,15 @@ int report(const Arguments& a, const Identified& found, const Keys& wanted) {
   return 0;
 }
 
-void add_common(Subcommand command, const std::shared_ptr<Arguments>& a) {
-  command.option("log", a->log, "log of a bench: LCM with EQUIPOISE_BENCH, or CSV").required();
-  command.option("--out", a->out, "TOML fragment for the configuration's include");
-  command.option("--json", a->json, "output file, - for stdout");
+void add_common(Subcommand command, const std::shared_ptr<IdentifyArguments>& a) {
+  command.option("log", a->log, "log of a bench: LCM with EQUIPOISE_BENCH, or CSV").file().required();
+  command.option("--out", a->out, "TOML fragment for the configuration's include").file();
+  command.option("--json", a->json, "output file, - for stdout").file();
 }
 
-void add_motor(Subcommand identify, const std::shared_ptr<Arguments>& a) {
-  const Subcommand motor = identify.subcommand("motor", "R, k, L and friction from a drive/brake log");
+void add_motor(Subcommand identify, const std::shared_ptr<IdentifyArguments>& a) {
+  const Subcommand motor = identify.subcommand("motor", "R, k, L and friction from a drive/brake log")
+                               .example("equipoise identify motor bench.lcm --out motor.toml");
   add_common(motor, a);
   motor.option("--inertia-kg-m2", a->inertia_kg_m2, "of the flywheel, when it is known").range(1e-7, 10.0);
   motor.action([=] {
@@ -96,9 +98,10 @@ void add_motor(Subcommand identify, const std::shared_ptr<Arguments>& a) {
   });
 }
 
-void add_friction(Subcommand identify, const std::shared_ptr<Arguments>& a) {
+void add_friction(Subcommand identify, const std::shared_ptr<IdentifyArguments>& a) {
   const Subcommand friction =
-      identify.subcommand("friction", "J_f, mu_c, mu_v of a ball on a flywheel, [T] (5.34)-(5.37)");
+      identify.subcommand("friction", "J_f, mu_c, mu_v of a ball on a flywheel, [T] (5.34)-(5.37)")
+          .example("equipoise identify friction rig.lcm --out friction.toml");
   add_common(friction, a);
   friction.option("--k1-N-m", a->rig.k1_N_m, "torque about the ball per unit of u")
       .show_default()
@@ -106,8 +109,9 @@ void add_friction(Subcommand identify, const std::shared_ptr<Arguments>& a) {
   friction.option("--k2-ball-N-m-s", a->rig.k2_ball_N_m_s, "back-EMF about the ball")
       .show_default()
       .range(0.0, 10.0);
-  friction.option("--radius-ratio", a->rig.flywheel_over_ball_radius, "flywheel's radius over the ball's")
-      .show_default()
+  friction
+      .option("--radius-ratio", a->rig.flywheel_over_ball_radius,
+              "flywheel's radius over the ball's; default: the log's")
       .range(0.01, 100.0);
   friction.flag("--separate-directions", a->rig.separate_directions, "Coulomb friction per direction");
   friction.flag("--stribeck", a->rig.stribeck, "excess at low speed");
@@ -121,9 +125,10 @@ void add_friction(Subcommand identify, const std::shared_ptr<Arguments>& a) {
 
 void add_identify(Subcommand app) {
   const Subcommand command =
-      app.subcommand("identify", "Parameters from bench logs, with confidence intervals");
+      app.subcommand("identify", "Parameters from bench logs, with confidence intervals")
+          .example("equipoise identify motor bench.lcm --out motor.toml");
   command.require_subcommand();
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<IdentifyArguments>();
   add_motor(command, a);
   add_friction(command, a);
 }

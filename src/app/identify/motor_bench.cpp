@@ -4,12 +4,14 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
+#include "app/cli/progress.hpp"
 #include "app/identify/bench_log.hpp"
 
 namespace equipoise::app {
 namespace {
 
-struct Arguments {
+struct MotorBenchArguments {
   std::vector<int> motors{1, 2, 3};
   std::vector<int> drivers{1, 2, 3};
   std::vector<double> pwm_hz{kBenchPwm_hz.begin(), kBenchPwm_hz.end()};
@@ -45,7 +47,7 @@ void write_trace(const std::string& path, const std::vector<BenchSample>& log,
   if (!file.flush()) throw InputError(path + ": cannot be written");
 }
 
-int run(const Arguments& a) {
+int run(const MotorBenchArguments& a) {
   const std::size_t cases = a.motors.size() * a.drivers.size() * a.pwm_hz.size();
   if ((!a.log.empty() || !a.trace.empty()) && cases != 1) {
     throw InputError("--log and --trace want one --motor, one --driver and one --pwm-hz");
@@ -54,9 +56,12 @@ int run(const Arguments& a) {
   nlohmann::json rows = nlohmann::json::array();
   BenchFit coast_sum;
   BenchFit linear_sum;
+  Progress progress("motor-bench");
+  std::size_t done = 0;
   for (const int motor : a.motors) {
     for (const int driver : a.drivers) {
       for (const double hz : a.pwm_hz) {
+        progress.at(static_cast<double>(done++) / static_cast<double>(cases));
         BenchParams p;
         p.seed = a.seed;
         p.motor = bench_motor(static_cast<std::size_t>(motor - 1), static_cast<std::size_t>(driver - 1), hz);
@@ -114,9 +119,11 @@ int run(const Arguments& a) {
 }  // namespace
 
 void add_motor_bench(Subcommand app) {
-  const Subcommand command = app.subcommand(
-      "motor-bench", "Simulated motor dynamometer at PWM resolution: current models against the sensor");
-  auto a = std::make_shared<Arguments>();
+  const Subcommand command =
+      app.subcommand("motor-bench",
+                     "Simulated motor dynamometer at PWM resolution: current models against the sensor")
+          .example("equipoise motor-bench --motor 1 --driver 1 --pwm-hz 20000 --log bench.lcm");
+  auto a = std::make_shared<MotorBenchArguments>();
   command.option("--motor", a->motors, "1 to 3, [T] Table 4.2 (default: all)").range(1, 3);
   command.option("--driver", a->drivers, "1 to 3, [T] Table 4.2 (default: all)").range(1, 3);
   command.option("--pwm-hz", a->pwm_hz, "PWM frequencies, Hz (default: 500 to 20000)").range(100.0, 100e3);
@@ -127,10 +134,10 @@ void add_motor_bench(Subcommand app) {
       .show_default()
       .range(1e-5, 1.0);
   command.option("--seed", a->seed, "seed of the sensors' noise").show_default();
-  const Option log = command.option("--log", a->log, "LCM event log of one case, for identify motor");
+  const Option log = command.option("--log", a->log, "LCM event log of one case, for identify motor").file();
   command.flag("--locked-step", a->locked_step, "log a step with the shaft locked, at 200 kHz").needs(log);
-  command.option("--trace", a->trace, "CSV of one case: measured and predicted currents");
-  command.option("--json", a->json, "output file, - for stdout");
+  command.option("--trace", a->trace, "CSV of one case: measured and predicted currents").file();
+  command.option("--json", a->json, "output file, - for stdout").file();
   command.action([=] { return run(*a); });
 }
 

@@ -1,13 +1,18 @@
 #include "app/io/fault_backend.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <utility>
 
 namespace equipoise::app {
 
 int FaultBackend::stall(int ticks, std::int64_t* now_ns) {
   for (int i = 1; i <= ticks; ++i) {
-    if (i == kGuardTicks) (void)rio_motors_off(&inner_);  // the guard's part
+    if (i == kGuardTicks) {  // the guard's part
+      cut_ = true;
+      (void)rio_motors_off(&inner_);
+    }
     const int status = rio_wait_tick(&inner_, now_ns);
     if (status != 0) return status;
   }
@@ -27,20 +32,61 @@ int FaultBackend::wait_tick(void* p, std::int64_t* now_ns) {
   return status;
 }
 
-void FaultBackend::spoil(rio_sensors_t* s) {
+int FaultBackend::write_motors(void* p, const rio_motors_t* motors) {
+  FaultBackend& b = self(p);
+  if (b.cut_) return 0;  // the guard holds them
+  // A bridge that does not obey keeps its last duty until the guard or the next try stops it.
+  if (b.is(FaultKind::kWriteError)) return -EIO;
+  rio_motors_t done = *motors;
+  if (b.is(FaultKind::kMotorDead)) done.duty[0] = 0.0;
+  if (b.is(FaultKind::kMotorsSwapped)) std::swap(done.duty[0], done.duty[1]);
+  if (b.is(FaultKind::kMotorStuck)) done.duty[0] = 0.6;
+  return rio_write_motors(&b.inner_, &done);
+}
+
+void FaultBackend::spoil_gyro(rio_sensors_t* s) const {
+  const auto since = [this](FaultKind first) {
+    return static_cast<std::size_t>(kind_) - static_cast<std::size_t>(first);
+  };
+  double(&gyro)[3] = s->gyro_counts;
+  if (kind_ >= FaultKind::kGyroXYSwapped) {
+    const std::size_t axis = since(FaultKind::kGyroXYSwapped);
+    std::swap(gyro[axis], gyro[(axis + 1) % 3]);
+  } else if (kind_ >= FaultKind::kGyroXFlipped) {
+    gyro[since(FaultKind::kGyroXFlipped)] *= -1.0;
+  } else if (kind_ >= FaultKind::kGyroXZero) {
+    gyro[since(FaultKind::kGyroXZero)] = 0.0;
+  } else {
+    const std::size_t axis = since(FaultKind::kGyroXFrozen);
+    gyro[axis] = frozen_.gyro_counts[axis];
+  }
+}
+
+void FaultBackend::spoil_imu(rio_sensors_t* s) {
   const auto gaussian = [this](double sigma) {
     return std::normal_distribution<double>(0.0, sigma)(engine_);
+  };
+  const auto uniform = [this](double limit) {
+    return std::floor(std::uniform_real_distribution<double>(-limit, limit)(engine_));
   };
   constexpr double kCountsPerRad_s = 16.4 * 180.0 / 3.14159265358979323846;
   switch (kind_) {
     case FaultKind::kImuOff:
+    case FaultKind::kImuGap:
+    case FaultKind::kAllGap:
       s->valid &= ~static_cast<unsigned>(RIO_IMU);
+      if (kind_ == FaultKind::kAllGap) s->valid = 0;
       std::fill(std::begin(s->gyro_counts), std::end(s->gyro_counts), 0.0);
       std::fill(std::begin(s->accel_counts), std::end(s->accel_counts), 0.0);
       break;
     case FaultKind::kImuStuck:
       std::copy(std::begin(frozen_.gyro_counts), std::end(frozen_.gyro_counts), s->gyro_counts);
       std::copy(std::begin(frozen_.accel_counts), std::end(frozen_.accel_counts), s->accel_counts);
+      break;
+    case FaultKind::kBadSamples:
+      if (age_ % 10 != 1) break;
+      for (double& g : s->gyro_counts) g = uniform(32767.0);
+      for (double& a : s->accel_counts) a = uniform(32767.0);
       break;
     case FaultKind::kNoiseBurst:
       for (double& g : s->gyro_counts) g += gaussian(20.0 * 16.4);
@@ -52,6 +98,38 @@ void FaultBackend::spoil(rio_sensors_t* s) {
     case FaultKind::kBiasJump:
       for (double& g : s->gyro_counts) g += 0.2 * kCountsPerRad_s;
       break;
+    case FaultKind::kGyroRamp:
+      for (double& g : s->gyro_counts) g += 0.2 * kCountsPerRad_s * 0.005 * age_;
+      break;
+    case FaultKind::kAccelFrozen:
+      std::copy(std::begin(frozen_.accel_counts), std::end(frozen_.accel_counts), s->accel_counts);
+      break;
+    case FaultKind::kHalfRate:
+      if (age_ % 2 == 0) break;
+      std::copy(std::begin(history_[1].gyro_counts), std::end(history_[1].gyro_counts), s->gyro_counts);
+      std::copy(std::begin(history_[1].accel_counts), std::end(history_[1].accel_counts), s->accel_counts);
+      s->t_ns = history_[1].t_ns;
+      break;
+    case FaultKind::kNack:
+    case FaultKind::kBusHang:
+      s->valid &= ~static_cast<unsigned>(RIO_IMU | RIO_ATTITUDE);
+      s->health |= RIO_IMU_BUS_ERROR;
+      break;
+    case FaultKind::kLostInterrupt:
+      s->valid &= ~static_cast<unsigned>(RIO_IMU | RIO_ATTITUDE);
+      s->health |= RIO_IMU_LATE;
+      s->t_ns = frozen_.t_ns;
+      break;
+    default:
+      if (kind_ >= FaultKind::kGyroXFrozen && kind_ <= FaultKind::kGyroZXSwapped) spoil_gyro(s);
+      break;
+  }
+}
+
+void FaultBackend::spoil(rio_sensors_t* s) {
+  const auto three_of_ten = [this] { return engine_() % 10 < 3; };
+  spoil_imu(s);
+  switch (kind_) {
     case FaultKind::kDelayed:
       *s = history_[3];
       break;
@@ -66,33 +144,39 @@ void FaultBackend::spoil(rio_sensors_t* s) {
       s->valid &= ~static_cast<unsigned>(RIO_ATTITUDE);
       s->health |= RIO_DMP_OVERFLOW;
       break;
-    case FaultKind::kNack:
-    case FaultKind::kBusHang:
-      s->valid &= ~static_cast<unsigned>(RIO_IMU | RIO_ATTITUDE);
-      s->health |= RIO_IMU_BUS_ERROR;
-      break;
-    case FaultKind::kLostInterrupt:
-      s->valid &= ~static_cast<unsigned>(RIO_IMU | RIO_ATTITUDE);
-      s->health |= RIO_IMU_LATE;
-      s->t_ns = frozen_.t_ns;
-      break;
     case FaultKind::kEncoderReversal:
       s->encoder_counts[0] = 2.0 * encoder_at_start_[0] - s->encoder_counts[0];
       break;
     case FaultKind::kCountJump:
       s->encoder_counts[1] += 500.0;
       break;
+    case FaultKind::kTwoEncodersDead:
+      s->encoder_counts[1] = encoder_at_start_[1];
+      s->encoder_counts[0] = encoder_at_start_[0];
+      break;
     case FaultKind::kWheelLoss:
       s->encoder_counts[0] = encoder_at_start_[0];
       break;
+    case FaultKind::kEncoderDead:
+      s->encoder_counts[0] = 0.0;
+      break;
+    case FaultKind::kEncoderErrors:
+      if (!three_of_ten()) break;
+      s->valid &= ~static_cast<unsigned>(RIO_ENCODERS);
+      s->health |= RIO_ENCODER_ERROR;
+      std::fill(std::begin(s->encoder_counts), std::end(s->encoder_counts), 0.0);
+      break;
     case FaultKind::kBatterySag:
       s->battery_counts *= 5.0 / 8.0;
+      break;
+    case FaultKind::kBatteryFlicker:
+      if (three_of_ten()) s->battery_counts = 0.0;
       break;
     case FaultKind::kAdcOpen:
       s->battery_counts = 0.0;
       break;
     default:
-      break;  // not of the sensors
+      break;  // of the IMU, or not of the sensors
   }
 }
 

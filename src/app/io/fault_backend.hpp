@@ -1,7 +1,8 @@
 // A hardware boundary that breaks on purpose: wraps any backend and spoils what passes through, from a given
 // tick on. In: backend, fault, first tick and how many -> out: another backend, and what of the fault lies
 // outside the boundary: a log that fails, a remote that is silent. While the loop is stalled it plays the
-// guard's part too: after three silent ticks the motors go off. Simulation and tests only.
+// guard's part too: after three silent ticks the motors go off, until the loop has let go of them. Simulation
+// and tests only.
 #pragma once
 
 #include <array>
@@ -15,27 +16,52 @@ namespace equipoise::app {
 
 enum class FaultKind : std::size_t {
   kImuOff,
+  kImuGap,
+  kAllGap,
   kImuStuck,
+  kBadSamples,
   kNoiseBurst,
   kNotANumber,
   kBiasJump,
   kDelayed,
   kDuplicated,
+  kHalfRate,
   kTornPacket,
   kFifoOverflow,
   kNack,
   kBusHang,
   kLostInterrupt,
+  kGyroXFrozen,
+  kGyroYFrozen,
+  kGyroZFrozen,
+  kGyroXZero,
+  kGyroYZero,
+  kGyroZZero,
+  kGyroXFlipped,
+  kGyroYFlipped,
+  kGyroZFlipped,
+  kGyroXYSwapped,
+  kGyroYZSwapped,
+  kGyroZXSwapped,
+  kGyroRamp,
+  kAccelFrozen,
   kEncoderReversal,
   kCountJump,
   kWheelLoss,
+  kEncoderDead,
+  kTwoEncodersDead,
+  kEncoderErrors,
   kBatterySag,
+  kBatteryFlicker,
   kAdcOpen,
   kClockJump,
   kStall1ms,
   kStall20ms,
   kStall50ms,
   kWriteError,
+  kMotorDead,
+  kMotorsSwapped,
+  kMotorStuck,
   kRemoteLost,
   kLogFull,
   kCount
@@ -45,35 +71,62 @@ struct FaultInfo {
   const char* name;
   /// Ticks from the fault until the motors must be off; 0: may be ridden through while the state stays right.
   int deadline_ticks;
-  /// Samples in a row that a check needs before the data are known to be unusable are part of the deadline.
   const char* why;
   bool once = false;  // strikes in its first tick only: what comes after is usable again
+  int ticks = 0;      // how long it lasts; 0: to the end
 };
 
 inline constexpr int kDeadlineTicks = 3;  // after the fault makes the data unusable
+inline constexpr int kBlindTicks =
+    30 + kDeadlineTicks;  // bridged by the model before (safety.max_missed_imu)
 inline constexpr std::array<FaultInfo, static_cast<std::size_t>(FaultKind::kCount)> kFaults{{
-    {"imu_off", kDeadlineTicks, "no sample"},
-    {"imu_stuck", 3 + kDeadlineTicks, "same numbers; three alike are needed to tell"},
+    {"imu_off", kBlindTicks, "no sample"},
+    {"imu_gap_100ms", 0, "no IMU sample for 100 ms", false, 20},
+    {"all_gap_30ms", 0, "no sample at all for 30 ms", false, 6},
+    {"imu_stuck", 3 + kBlindTicks, "same numbers; three alike are needed to tell"},
+    {"bad_samples", 0, "one IMU sample of ten is garbage, for a second", false, 200},
     {"noise_burst", 0, "20 deg/s and 0.5 g of noise"},
-    {"not_a_number", 1, "in the gyro"},
+    {"not_a_number", kBlindTicks, "in the gyro"},
     {"bias_jump", 0, "0.2 rad/s on the gyro"},
     {"delayed", 0, "samples three ticks old"},
-    {"duplicated", kDeadlineTicks, "one sample again and again"},
+    {"duplicated", kBlindTicks, "one sample again and again"},
+    {"half_rate", 0, "each IMU sample comes twice"},
     {"torn_packet", 0, "attitude packet refused"},
     {"fifo_overflow", 0, "attitude packets lost"},
-    {"nack", kDeadlineTicks, "IMU does not answer"},
-    {"bus_hang", 1, "the read takes 60 ms and fails"},
-    {"lost_interrupt", kDeadlineTicks, "ticks by deadline, no samples"},
+    {"nack", kBlindTicks, "IMU does not answer"},
+    {"bus_hang", kBlindTicks, "the read takes 60 ms and fails"},
+    {"lost_interrupt", kBlindTicks, "ticks by deadline, no samples"},
+    {"gyro_x_frozen", 0, "repeats its last count"},
+    {"gyro_y_frozen", 0, "repeats its last count"},
+    {"gyro_z_frozen", 0, "repeats its last count"},
+    {"gyro_x_zero", 0, "reads zero"},
+    {"gyro_y_zero", 0, "reads zero"},
+    {"gyro_z_zero", 0, "reads zero"},
+    {"gyro_x_flipped", 0, "reads minus the rate"},
+    {"gyro_y_flipped", 0, "reads minus the rate"},
+    {"gyro_z_flipped", 0, "reads minus the rate"},
+    {"gyro_xy_swapped", 0, "each reads the other's rate"},
+    {"gyro_yz_swapped", 0, "each reads the other's rate"},
+    {"gyro_zx_swapped", 0, "each reads the other's rate"},
+    {"gyro_ramp", 0, "bias grows by 0.2 rad/s a second"},
+    {"accel_frozen", 0, "accelerometer repeats its last counts"},
     {"encoder_reversal", 0, "one encoder counts backwards"},
-    {"count_jump", 1, "500 counts at once", true},
+    {"count_jump", 0, "500 counts at once", true},
     {"wheel_loss", 0, "one encoder stands still"},
+    {"encoder_dead", 0, "one encoder reads zero"},
+    {"two_encoders_dead", 0, "two encoders stand still"},
+    {"encoder_errors", 0, "three reads of ten fail, for a second", false, 200},
     {"battery_sag", 5, "5 V"},
+    {"battery_flicker", 0, "three readings of ten are zero"},
     {"adc_open", 5, "reads zero"},
     {"clock_jump", 0, "time stamps jump by 1 s, once"},
     {"stall_1ms", 0, "below a tick"},
-    {"stall_20ms", 1, "the loop wakes late", true},
-    {"stall_50ms", 1, "the loop wakes late", true},
+    {"stall_20ms", 0, "the loop wakes late", true},
+    {"stall_50ms", 0, "the loop wakes late", true},
     {"write_error", 2, "motor writes fail"},
+    {"motor_dead", 0, "one motor does not turn"},
+    {"motors_swapped", 0, "each does what the other is told"},
+    {"motor_stuck", 0, "one bridge keeps 0.6 duty"},
     {"remote_lost", 0, "commands get old: CAN bus-off, remote gone"},
     {"log_full", 2, "the log cannot be written"},
 }};
@@ -107,14 +160,16 @@ class FaultBackend {
   bool first(FaultKind kind) const { return is(kind) && age_ == 1; }
   int stall(int ticks, std::int64_t* now_ns);
   void spoil(rio_sensors_t* s);
+  void spoil_imu(rio_sensors_t* s);
+  void spoil_gyro(rio_sensors_t* s) const;
 
   static int wait_tick(void* p, std::int64_t* now_ns);
   static int read_sensors(void* p, rio_sensors_t* out);
-  static int write_motors(void* p, const rio_motors_t* motors) {
-    // A bridge that does not obey keeps its last duty until the guard or the next try stops it.
-    return self(p).is(FaultKind::kWriteError) ? -EIO : rio_write_motors(&self(p).inner_, motors);
+  static int write_motors(void* p, const rio_motors_t* motors);
+  static int motors_off(void* p) {
+    self(p).cut_ = false;  // the loop has let go
+    return rio_motors_off(&self(p).inner_);
   }
-  static int motors_off(void* p) { return rio_motors_off(&self(p).inner_); }
   static void close(void* p) { rio_close(&self(p).inner_); }
 
   rio_t inner_;
@@ -122,7 +177,8 @@ class FaultBackend {
   std::mt19937_64 engine_;
   FaultKind kind_ = FaultKind::kImuOff;
   int left_ = 0;
-  int age_ = 0;  // ticks since the start, the first is 1
+  int age_ = 0;       // ticks since the start, the first is 1
+  bool cut_ = false;  // the guard has stopped the motors and the loop has not let go since
   std::int64_t clock_offset_ns_ = 0;
   rio_sensors_t frozen_{};
   std::array<rio_sensors_t, 4> history_{};

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
 #include "app/log/mcap_writer.hpp"
 #include "app/log/run_log.hpp"
 #include "equipoise/runtime/wire.hpp"
@@ -17,7 +18,7 @@ using runtime::StateRecord;
 using runtime::TickRecord;
 namespace fields = runtime::fields;
 
-struct Arguments {
+struct ConvertArguments {
   std::string log;
   std::string to;
   std::string out;
@@ -122,6 +123,7 @@ std::int64_t write_csv(const std::string& path, std::ostream& out) {
   CsvRows rows(path);
   out << rows.head();
   RunLog log(path);
+  log.show_progress("convert");
   std::int64_t ticks = 0;
   for (TickRecord tick; log.next(&tick); ++ticks) out << rows.row(tick, log.estimators());
   return ticks;
@@ -149,6 +151,7 @@ class McapMessages {
         event.channel == fields::kTruthChannel || event.channel.rfind(fields::kComparedChannel, 0) == 0;
     if (state) message(fields::State{}, event, &tick_.truth);
     if (event.channel == fields::kHistogramChannel) message(fields::Histogram{}, event, &histogram_);
+    if (event.channel == fields::kEndChannel) message(fields::End{}, event, &end_);
     fields::each_message(tick_, [&](auto type, std::string_view channel, auto& record) {
       if (channel == event.channel) message(type, event, &record);
     });
@@ -194,6 +197,7 @@ class McapMessages {
   std::map<std::string, std::uint16_t, std::less<>> channels_;
   TickRecord tick_{};
   fields::HistogramRecord histogram_{};
+  runtime::EndRecord end_;
   std::string json_;
 };
 
@@ -201,6 +205,7 @@ std::int64_t write_mcap(const std::string& path, std::ostream& out) {
   McapMessages messages(out);
   messages.run(RunLog(path).run());
   LogReader reader = LogReader::open(path);
+  reader.show_progress("convert");
   std::int64_t ticks = 0;
   for (LogEvent event; reader.next(&event);) {
     messages.event(event);
@@ -210,7 +215,7 @@ std::int64_t write_mcap(const std::string& path, std::ostream& out) {
   return ticks;
 }
 
-int convert(Arguments a) {
+int convert(ConvertArguments a) {
   TickRecord first;
   if (!RunLog(a.log).next(&first)) throw InputError(a.log + ": holds no whole tick");
   if (a.out.empty()) a.out = std::filesystem::path(a.log).replace_extension(a.to).string();
@@ -224,11 +229,12 @@ int convert(Arguments a) {
 }  // namespace
 
 void add_convert(Subcommand app) {
-  const Subcommand command = app.subcommand("convert", "Converts a log for other tools");
-  auto a = std::make_shared<Arguments>();
-  command.option("log", a->log, "LCM event log of sim or run; its further parts are found").required();
+  const Subcommand command = app.subcommand("convert", "Converts a log for other tools")
+                                 .example("equipoise convert logs/latest/run.lcm --to mcap");
+  auto a = std::make_shared<ConvertArguments>();
+  command.option("log", a->log, "LCM event log of sim or run; its further parts are found").file().required();
   command.option("--to", a->to, "mcap (Foxglove) or csv").required().one_of({"mcap", "csv"});
-  command.option("--out", a->out, "file to write (default: beside the log)");
+  command.option("--out", a->out, "file to write (default: beside the log)").file();
   command.action([=] { return convert(*a); });
 }
 

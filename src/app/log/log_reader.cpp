@@ -9,7 +9,7 @@ namespace equipoise::app {
 namespace {
 
 constexpr std::string_view kSync("\xED\xA1\xDA\x01", 4);
-constexpr std::size_t kHeader = 28;  // sync, number, time in microseconds, lengths of channel and data
+constexpr std::size_t kEventHeader = 28;  // sync, number, time in microseconds, lengths of channel and data
 constexpr std::size_t kLongestChannel = 256;
 constexpr std::size_t kLargestMessage = 1U << 24U;
 constexpr std::size_t kReadBytes = 1U << 18U;
@@ -37,6 +37,14 @@ LogReader LogReader::over(std::string bytes) {
   return reader;
 }
 
+void LogReader::show_progress(const std::string& what) {
+  std::error_code ignored;
+  total_bytes_ = 1.0;
+  for (const std::string& part : parts_)
+    total_bytes_ += static_cast<double>(std::filesystem::file_size(part, ignored));
+  progress_ = std::make_unique<Progress>(what);
+}
+
 bool LogReader::next_part() {
   if (next_part_ == parts_.size()) return false;
   const std::string& path = parts_[next_part_++];
@@ -60,6 +68,8 @@ bool LogReader::has(std::size_t bytes) {
     buffer_.resize(kept + kReadBytes);
     file_.read(buffer_.data() + kept, static_cast<std::streamsize>(kReadBytes));
     buffer_.resize(kept + static_cast<std::size_t>(file_.gcount()));
+    read_bytes_ += static_cast<double>(file_.gcount());
+    if (progress_ != nullptr) progress_->at(read_bytes_ / total_bytes_);
   }
   return true;
 }
@@ -84,15 +94,15 @@ bool LogReader::next(LogEvent* event) {
       if (!next_part()) return false;
       continue;
     }
-    if (has(kHeader) && buffer_.compare(at_, kSync.size(), kSync) == 0) {
-      const std::string_view header(buffer_.data() + at_, kHeader);
+    if (has(kEventHeader) && buffer_.compare(at_, kSync.size(), kSync) == 0) {
+      const std::string_view header(buffer_.data() + at_, kEventHeader);
       const std::size_t channel = length(header.substr(20, 4));
       const std::size_t data = length(header.substr(24, 4));
       const auto utime = static_cast<std::int64_t>(big_endian(header.substr(12, 8)));
-      if (channel <= kLongestChannel && data <= kLargestMessage && has(kHeader + channel + data)) {
-        const std::string_view body(buffer_.data() + at_ + kHeader, channel + data);
+      if (channel <= kLongestChannel && data <= kLargestMessage && has(kEventHeader + channel + data)) {
+        const std::string_view body(buffer_.data() + at_ + kEventHeader, channel + data);
         *event = {utime, body.substr(0, channel), body.substr(channel)};
-        at_ += kHeader + channel + data;
+        at_ += kEventHeader + channel + data;
         return true;
       }
     }

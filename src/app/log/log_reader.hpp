@@ -5,9 +5,12 @@
 
 #include <cstdint>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "app/cli/progress.hpp"
 
 namespace equipoise::app {
 
@@ -25,6 +28,8 @@ class LogReader {
 
   /// False at the end.
   bool next(LogEvent* event);
+  /// Shows how far it is, as "WHAT: 12 %".
+  void show_progress(const std::string& what);
   /// Left out so far: damage, or a torn end.
   std::size_t damaged_bytes() const { return damaged_; }
 
@@ -38,6 +43,9 @@ class LogReader {
   std::size_t next_part_ = 0;
   std::ifstream file_;
   std::string buffer_;
+  std::unique_ptr<Progress> progress_;
+  double total_bytes_ = 0.0;  // of all parts
+  double read_bytes_ = 0.0;
   std::size_t at_ = 0;
   std::size_t damaged_ = 0;
 };

@@ -22,9 +22,18 @@ nlohmann::json ReplayErrors::json(double radius_m) const {
           {"ticks", ticks}};
 }
 
-Replay replay_log(RunLog& log, const std::string& origin, const std::string& other) {
+nlohmann::json Retuned::Figures::json(std::int64_t ticks, double radius_m) const {
+  if (ticks == 0) return nullptr;
+  const auto n = static_cast<double>(ticks);
+  return {{"errors", errors.json(radius_m)},
+          {"duty_rms", std::sqrt(duty_squared / n)},
+          {"normalized_innovation_mean", innovation / n},
+          {"saturated_fraction", static_cast<double>(saturated) / n}};
+}
+
+Replay replay_log(RunLog& log, const std::string& origin, const Beside& beside) {
   return with_robot(log.run().robot, origin,
-                    [&](auto firmware) { return replay_as<decltype(firmware)>(log, origin, other); });
+                    [&](auto firmware) { return replay_as<decltype(firmware)>(log, origin, beside); });
 }
 
 }  // namespace equipoise::app

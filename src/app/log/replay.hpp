@@ -1,10 +1,12 @@
 // A log's samples, commands and inhibit bits through the pipeline again, and what differs. In: a log -> out:
-// the first difference from what it holds, bit for bit; with `other`, the errors of another estimator beside
+// the first difference from what it holds, bit for bit; asked for, another estimator or another tuning beside
 // it. InputError when the log holds no whole tick or its choices are unknown.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "app/cli/json.hpp"
 #include "app/log/run_log.hpp"
@@ -33,20 +35,44 @@ struct ReplayErrors {
   nlohmann::json json(double radius_m) const;
 };
 
+/// Another tuning on the run's samples, commands and inputs, over the ticks in which the run was armed, after
+/// its first five seconds.
+struct Retuned {
+  /// Of one tuning, summed over the ticks.
+  struct Figures {
+    ReplayErrors errors;        // against the truth
+    double duty_squared = 0.0;  // mean of the motors
+    double innovation = 0.0;    // normalised: 1 when the noise is as the filter believes
+    std::int64_t saturated = 0;
+
+    nlohmann::json json(std::int64_t ticks, double radius_m) const;
+  };
+  Figures recorded, changed;
+  ReplayErrors difference;     // of the estimates
+  std::int64_t not_armed = 0;  // ticks in which this tuning would have taken the motors away
+  std::uint32_t reasons = 0;   // why
+};
+
 struct Replay {
   std::int64_t ticks = 0;
   std::int64_t incomplete = 0;  // ticks of which the log lost a part
   std::size_t damaged_bytes = 0;
   std::int64_t missing = 0;  // ticks that the log lost
-  Verdict verdict;           // of what the log holds; that a run was interrupted is not in its ticks
+  Verdict verdict;           // the run's own; of a log that was cut off, what its ticks say
   Difference difference;
   ReplayErrors logged, other;
+  std::optional<Retuned> retuned;
 
   bool identical() const { return ticks > 0 && missing == 0 && !difference.found; }
 };
 
-/// `other`: estimator that runs beside the one that controlled, on the same samples and inputs; empty: none.
+/// What runs beside the recorded run.
+struct Beside {
+  std::string estimator;         // empty: none, or the recorded one
+  std::vector<std::string> set;  // changes of the configuration, as of --set; empty: the recorded tuning
+};
+
 /// `origin` names the log in errors.
-Replay replay_log(RunLog& log, const std::string& origin, const std::string& other);
+Replay replay_log(RunLog& log, const std::string& origin, const Beside& beside);
 
 }  // namespace equipoise::app

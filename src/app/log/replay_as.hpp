@@ -10,6 +10,7 @@
 
 #include "app/cli/commands.hpp"
 #include "app/log/replay.hpp"
+#include "app/log/retuned.hpp"
 #include "app/run/firmware.hpp"
 #include "equipoise/runtime/fields.hpp"
 #include "equipoise/runtime/loop.hpp"
@@ -124,13 +125,18 @@ class LoggedSupervisor {
 inline VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept {
   const double tilt_rad = r.has_truth ? std::hypot(r.truth.theta_rad[0], r.truth.theta_rad[1]) : std::nan("");
   const double simulated_s = 1e-9 * static_cast<double>(r.now_ns);
-  return {r.has_truth ? simulated_s : static_cast<double>(r.tick) * kTickS, r.arm, r.enable, r.reasons,
-          tilt_rad};
+  return {r.has_truth ? simulated_s : static_cast<double>(r.tick) * kTickS, r.arm,
+          r.arm_state == static_cast<std::int32_t>(ArmState::kArmed), r.reasons, tilt_rad};
 }
 
-template <class Pipeline>
-Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other) {
-  constexpr std::int64_t kSettled = 1000;  // ticks, 5 s
+/// What counts, as in sim: from the fifth second on; simulated clocks start at 0.
+inline bool settled(const runtime::TickRecord& r) noexcept {
+  return r.has_truth ? r.now_ns >= 5'000'000'000 : r.tick >= 1000;
+}
+
+/// `also(tick as logged, sample, command)` after each tick.
+template <class Pipeline, class Also>
+Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other, Also&& also) {
   Replay out;
   LoggedIo io(log);
   LoggedSupervisor supervisor(io);
@@ -150,14 +156,15 @@ Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other)
     expected = tick.tick + 1;
     record_tick(tick.tick, now_ns, raw, command, result, pipeline, &record);
     compare(tick, record, &out.difference);
+    also(tick, raw, command);
     judge.observe(judged(tick));
-    if (!tick.has_truth || tick.tick < kSettled) return;
+    if (!tick.has_truth || !settled(tick)) return;
     out.logged.add(tick.estimate, tick.truth);
     if (other) out.other.add(record.others[*other], tick.truth);
   };
   out.ticks = runtime::run_loop(io, pipeline, commands, on_tick, never, supervisor).ticks;
   io.rethrow();
-  out.verdict = judge.verdict(false, false);
+  out.verdict = log.end() ? Verdict::of(*log.end()) : judge.verdict(false, false);
   out.incomplete = log.incomplete_ticks();
   out.damaged_bytes = log.damaged_bytes();
   return out;
@@ -172,22 +179,61 @@ std::optional<std::size_t> index_of(const std::string& estimator) {
   return std::nullopt;
 }
 
+template <class Firmware, class P>
+typename P::Params params_of(const typename Firmware::Config& config, const std::string& controller) {
+  std::optional<typename P::Params> params;
+  Firmware::with_pipeline(config, controller, [&params](auto& pipeline) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(pipeline)>, P>) params = pipeline.params();
+  });
+  return params.value();
+}
+
+/// The run as recorded and, beside it, with the parameters `changed`.
+template <class P>
+Replay replay_retuned(RunLog& log, const typename P::Params& recorded, const typename P::Params& changed) {
+  Tapped<P> leader(tapped<P>(recorded, true));
+  Tapped<P> follower(tapped<P>(changed, false));
+  GivenInputs<typename P::Input> inputs;
+  leader.estimators().tap([&](auto* u, bool* held) { inputs.keep(*u, *held); });
+  follower.estimators().tap([&](auto* u, bool* held) { inputs.hand_on(u, held); });
+  Retuned retuned;
+  runtime::TickRecord record{};
+  const auto also = [&](const runtime::TickRecord& tick, const RawSample& raw, const Command& command) {
+    decltype(P::Result::x_hat) known;
+    if (tick.has_truth && recall(tick.truth, &known)) follower.estimators().observe_truth(known);
+    const auto result = follower.tick(raw, command, {tick.now_ns, tick.inhibit});
+    inputs.begin();
+    record_tick(tick.tick, tick.now_ns, raw, command, result, follower, &record);
+    if (settled(tick)) compare_tunings(tick, record, &retuned);
+  };
+  Replay out = replay(log, leader, std::nullopt, also);
+  out.retuned = retuned;
+  return out;
+}
+
 /// As replay_log(), of this robot's log.
 template <class Firmware>
-Replay replay_as(RunLog& log, const std::string& origin, const std::string& other) {
+Replay replay_as(RunLog& log, const std::string& origin, const Beside& beside = {}) {
   const runtime::RunInfo& info = log.run();
   Choice choice{info.estimator, info.controller, info.fidelity, false, info.attitude, info.backend};
   complete<Firmware>(choice);
-  if (!other.empty()) {
-    Choice asked{other, info.controller, "", false, ""};
+  Choice asked = choice;
+  if (!beside.estimator.empty()) {
+    asked.estimator = beside.estimator;
     complete<Firmware>(asked);
-    choice.compare = true;
   }
-  const auto loaded = Firmware::parse(info.config_toml, origin + " (its configuration)");
-  const auto config = Firmware::apply(loaded.config, choice);
-  const std::optional<std::size_t> index = index_of<Firmware>(other);
-  Replay r = Firmware::with_pipeline(config, choice.controller,
-                                     [&](auto& pipeline) { return replay(log, pipeline, index); });
+  const std::string where = origin + " (its configuration)";
+  const auto nothing = [](const runtime::TickRecord&, const RawSample&, const Command&) {};
+  choice.compare = beside.set.empty() && !beside.estimator.empty();
+  const auto config = Firmware::apply(Firmware::parse(info.config_toml, where).config, choice);
+  const std::optional<std::size_t> index =
+      choice.compare ? index_of<Firmware>(beside.estimator) : std::nullopt;
+  Replay r = Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    if (beside.set.empty()) return replay(log, pipeline, index, nothing);
+    using P = std::decay_t<decltype(pipeline)>;
+    const auto changed = Firmware::apply(Firmware::parse(info.config_toml, where, beside.set).config, asked);
+    return replay_retuned<P>(log, pipeline.params(), params_of<Firmware, P>(changed, choice.controller));
+  });
   if (r.ticks == 0) throw InputError(origin + ": holds no whole tick");
   return r;
 }

@@ -2,16 +2,18 @@
 #include <cstdio>
 
 #include "app/cli/commands.hpp"
+#include "app/cli/json.hpp"
+#include "app/cli/reasons.hpp"
+#include "app/cli/version.hpp"
 #include "app/log/replay.hpp"
-#include "app/run/firmware.hpp"
 
 namespace equipoise::app {
 namespace {
 
-struct Arguments {
+struct ReplayArguments {
   std::string log;
   std::string json;
-  std::string estimator;
+  Beside beside;
 };
 
 std::string shown(double value) {
@@ -20,7 +22,18 @@ std::string shown(double value) {
   return text;
 }
 
-nlohmann::json to_json(const Arguments& a, const runtime::RunInfo& run, const Replay& r) {
+nlohmann::json to_json(const Beside& beside, const runtime::RunInfo& run, const Retuned& t) {
+  const std::int64_t ticks = t.difference.ticks;
+  return {{"set", beside.set},
+          {"estimator", beside.estimator.empty() ? run.estimator : beside.estimator},
+          {"recorded", t.recorded.json(ticks, run.rolling_radius_m)},
+          {"changed", t.changed.json(ticks, run.rolling_radius_m)},
+          {"difference", t.difference.json(run.rolling_radius_m)},
+          {"not_armed_ticks", t.not_armed},
+          {"reasons", reason_names(t.reasons)}};
+}
+
+nlohmann::json to_json(const ReplayArguments& a, const runtime::RunInfo& run, const Replay& r) {
   nlohmann::json difference = nullptr;
   if (r.difference.found) {
     difference = {{"tick", r.difference.tick},
@@ -29,7 +42,8 @@ nlohmann::json to_json(const Arguments& a, const runtime::RunInfo& run, const Re
                   {"replayed", r.difference.replayed}};
   }
   nlohmann::json errors = {{run.estimator, r.logged.json(run.rolling_radius_m)}};
-  if (!a.estimator.empty()) errors[a.estimator] = r.other.json(run.rolling_radius_m);
+  if (!r.retuned && !a.beside.estimator.empty())
+    errors[a.beside.estimator] = r.other.json(run.rolling_radius_m);
   nlohmann::json out{{"log", a.log},
                      {"robot", run.robot},
                      {"estimator", run.estimator},
@@ -44,11 +58,42 @@ nlohmann::json to_json(const Arguments& a, const runtime::RunInfo& run, const Re
                      {"errors", errors},
                      {"log_version", run.version},
                      {"version", version()}};
+  if (r.retuned) out["retuned"] = to_json(a.beside, run, *r.retuned);
   r.verdict.write(&out);
   return out;
 }
 
-void print(std::FILE* out, const Arguments& a, const runtime::RunInfo& run, const Replay& r) {
+void print(std::FILE* out, const runtime::RunInfo& run, const std::string& name, const ReplayErrors& e) {
+  if (e.ticks == 0) return;
+  const nlohmann::json j = e.json(run.rolling_radius_m);
+  std::fprintf(out, "  %-18s attitude %.4f rad, rolling speed %.2f cm/s, position %.3f m (RMS)\n",
+               name.c_str(), j["attitude_rmse_rad"].get<double>(),
+               100.0 * j["rolling_speed_rmse_m_s"].get<double>(), j["position_rmse_m"].get<double>());
+}
+
+void print(std::FILE* out, const Beside& beside, const runtime::RunInfo& run, const Retuned& t) {
+  const std::int64_t ticks = t.difference.ticks;
+  if (ticks == 0) {
+    std::fprintf(out, "  nothing to compare: the run was not armed after its first 5 s\n");
+    return;
+  }
+  const auto figures = [&](const char* name, const Retuned::Figures& f) {
+    const nlohmann::json j = f.json(ticks, run.rolling_radius_m);
+    std::fprintf(out, "  %-18s duty %.4f (RMS), normalised innovation %.3f (mean), saturated %.2f %%\n", name,
+                 j["duty_rms"].get<double>(), j["normalized_innovation_mean"].get<double>(),
+                 100.0 * j["saturated_fraction"].get<double>());
+    print(out, run, "", f.errors);
+  };
+  figures("recorded", t.recorded);
+  figures(beside.estimator.empty() ? "changed" : beside.estimator.c_str(), t.changed);
+  print(out, run, "between the two", t.difference);
+  if (t.not_armed == 0) return;
+  std::fprintf(out, "  changed, it would have taken the motors away in %lld of %lld ticks: %s\n",
+               static_cast<long long>(t.not_armed), static_cast<long long>(ticks),
+               reasons_text(t.reasons).c_str());
+}
+
+void print(std::FILE* out, const ReplayArguments& a, const runtime::RunInfo& run, const Replay& r) {
   std::fprintf(out, "%s: %s, %s, %s, %lld ticks\n", a.log.c_str(), run.robot.c_str(), run.estimator.c_str(),
                run.controller.c_str(), static_cast<long long>(r.ticks));
   if (r.missing > 0) {
@@ -64,20 +109,18 @@ void print(std::FILE* out, const Arguments& a, const runtime::RunInfo& run, cons
     std::fprintf(out, "  estimate, control and duty are the same, bit for bit\n");
   }
   std::fprintf(out, "  %s\n", r.verdict.sentence().c_str());
-  const auto errors = [&](const std::string& name, const ReplayErrors& e) {
-    if (e.ticks == 0) return;
-    const nlohmann::json j = e.json(run.rolling_radius_m);
-    std::fprintf(out, "  %-18s attitude %.4f rad, rolling speed %.2f cm/s, position %.3f m (RMS)\n",
-                 name.c_str(), j["attitude_rmse_rad"].get<double>(),
-                 100.0 * j["rolling_speed_rmse_m_s"].get<double>(), j["position_rmse_m"].get<double>());
-  };
-  errors(run.estimator, r.logged);
-  if (!a.estimator.empty()) errors(a.estimator, r.other);
+  if (r.retuned) {
+    print(out, a.beside, run, *r.retuned);
+    return;
+  }
+  print(out, run, run.estimator, r.logged);
+  if (!a.beside.estimator.empty()) print(out, run, a.beside.estimator, r.other);
 }
 
-int run(const Arguments& a) {
+int run(const ReplayArguments& a) {
   RunLog log(a.log);
-  const Replay r = replay_log(log, a.log, a.estimator);
+  log.show_progress("replay");
+  const Replay r = replay_log(log, a.log, a.beside);
   print(a.json == "-" ? stderr : stdout, a, log.run(), r);
   if (!a.json.empty()) write_json(to_json(a, log.run(), r), a.json);
   return r.identical() ? 0 : 1;
@@ -86,11 +129,15 @@ int run(const Arguments& a) {
 }  // namespace
 
 void add_replay(Subcommand app) {
-  const Subcommand command = app.subcommand("replay", "Re-runs the pipeline on a log's sensors, bit for bit");
-  auto a = std::make_shared<Arguments>();
-  command.option("log", a->log, "LCM event log of sim or run; its further parts are found").required();
-  command.option("--estimator", a->estimator, "run this one beside it; errors against the log's truth");
-  command.option("--json", a->json, "result as JSON, - for stdout");
+  const Subcommand command = app.subcommand("replay", "Re-runs the pipeline on a log's sensors, bit for bit")
+                                 .example("equipoise replay logs/latest/run.lcm --estimator ekf13");
+  auto a = std::make_shared<ReplayArguments>();
+  command.option("log", a->log, "LCM event log of sim or run; its further parts are found").file().required();
+  command.option("--estimator", a->beside.estimator,
+                 "run this one beside it; errors against the log's truth");
+  command.option("--set", a->beside.set,
+                 "key=value: run this tuning beside it, e.g. noise or weights; may be repeated");
+  command.option("--json", a->json, "result as JSON, - for stdout").file();
   command.action([=] { return run(*a); });
 }
 

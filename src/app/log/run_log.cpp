@@ -86,6 +86,9 @@ bool RunLog::next(TickRecord* tick) {
 void RunLog::take(const LogEvent& event) {
   if (event.channel == fields::kTruthChannel) {
     tick_.has_truth = decode_of_tick(fields::State{}, event, tick_, &tick_.truth);
+  } else if (event.channel == fields::kEndChannel) {
+    runtime::EndRecord end;
+    if (decode_of_tick(fields::End{}, event, tick_, &end)) end_ = end;
   } else if (event.channel.substr(0, fields::kComparedChannel.size()) == fields::kComparedChannel) {
     take_compared(event);
   } else {

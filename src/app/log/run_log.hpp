@@ -3,6 +3,7 @@
 // motors, health and timing are there. Not for the tick.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,10 @@ class RunLog {
   /// From the bytes of a log; `origin` names it in errors.
   RunLog(const std::string& bytes, const std::string& origin);
 
+  void show_progress(const std::string& what) { reader_.show_progress(what); }
   const runtime::RunInfo& run() const { return run_; }
+  /// As the run judged itself, once the log has been read; none: it was cut off, or killed.
+  const std::optional<runtime::EndRecord>& end() const { return end_; }
   /// Next whole tick; false at the end.
   bool next(runtime::TickRecord* tick);
 
@@ -34,6 +38,7 @@ class RunLog {
 
   LogReader reader_;
   runtime::RunInfo run_;
+  std::optional<runtime::EndRecord> end_;
   std::vector<std::string> estimators_;
   std::int64_t incomplete_ticks_ = 0;
   runtime::TickRecord tick_{};

@@ -2,8 +2,6 @@
 
 namespace equipoise::app {
 
-std::string version() { return EQUIPOISE_VERSION; }
-
 namespace {
 
 /// "mbbr: a, b; mip: c, d".

@@ -7,15 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "app/cli/version.hpp"
 #include "equipoise/config.hpp"
 #include "equipoise/runtime/record.hpp"
-#include "equipoise/runtime/telemetry.hpp"
 #include "robots/robot_list.hpp"
 
 namespace equipoise::app {
-
-/// Of this build.
-std::string version();
 
 // Of the robots, for what is qualified with app::.
 using equipoise::Choice;

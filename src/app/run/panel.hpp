@@ -2,7 +2,7 @@
 // command that was asked for -> out: the command that is allowed, LEDs. PAUSE disarms; pressed again it lets
 // arm, once whoever commands has let go of arming. MODE cycles full, half, quarter speed. Bars: as many as
 // the speed allows, blinking while paused. A thread of its own looks at the buttons; limit() is RT-safe. What
-// cannot be opened is a warning, never a reason not to fly.
+// cannot be opened is a warning, never a reason not to run.
 #pragma once
 
 #include <array>

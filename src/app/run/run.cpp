@@ -1,13 +1,16 @@
-// `equipoise run`: the robot on its board, or against a physics engine.
+// `equipoise run`: the robot on its board, against a physics engine, or in a simulated world to practise.
 #include <cstring>
 
 #include "app/board/board.hpp"
 #include "app/cli/commands.hpp"
 #include "app/commission/self_test.hpp"
 #include "app/io/lockstep.hpp"
+#include "app/io/plant_backend.hpp"
+#include "app/io/practice_backend.hpp"
 #include "app/log/log_name.hpp"
 #include "app/run/runner.hpp"
 #include "bbb.h"
+#include "config/population.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -62,6 +65,28 @@ int run_lockstep(const RunArguments& a) {
   return report(a, Firmware::kName, last, trials, runner.sha256(), nullptr);
 }
 
+/// What `sim` simulates, behind what the board runs.
+template <class Firmware>
+int run_simulated(const RunArguments& a) {
+  Runner<Firmware> runner(
+      a,
+      config::with_robot_drawn(config::draw_robot(a.config, a.set, a.choice.fidelity, a.robot_number),
+                               a.choice.fidelity, a.set),
+      "");
+  std::vector<PlannedFault> faults;
+  for (const std::string& text : a.faults) faults.push_back(planned_fault(text));
+  auto world = Firmware::world(runner.config(), fidelity_level(a.choice.fidelity), a.seed);
+  PlantBackend simulated(world);
+  PracticeBackend practice(simulated.io(), a.speed, faults, a.seed);
+  std::optional<runtime::Supervisor> supervisor;
+  const Outcome outcome =
+      runner.run(practice.io(), 1, nullptr, [&](const std::atomic<bool>& log_failed) -> runtime::Supervisor& {
+        const std::atomic<bool>& failed = practice.breaks_log() ? practice.log_failed() : log_failed;
+        return supervisor.emplace(runtime::Watched{nullptr, 0, &failed, true});  // simulated time
+      });
+  return report(a, Firmware::kName, outcome, 1, runner.sha256(), nullptr);
+}
+
 template <class Firmware>
 int run_board(const RunArguments& a, const Board& board, const std::string& board_toml) {
   const Overrides overrides = overrides_of(board, a.set);
@@ -93,6 +118,7 @@ int run_board(const RunArguments& a, const Board& board, const std::string& boar
 
 int run(RunArguments a) {
   a.choice.backend = a.backend;
+  if (a.backend != "sim") a.choice.fidelity.clear();
   if (a.backend == "lockstep" && a.socket.empty()) throw InputError("--backend lockstep needs --socket PATH");
   if (a.backend == "board" && a.board.empty())
     throw InputError("--backend board needs --board FILE, e.g. config/boards/robotics_cape_mbbr.toml");
@@ -106,6 +132,7 @@ int run(RunArguments a) {
     if (a.choice.estimator == "truth")
       throw InputError("--estimator truth: only a simulation knows the truth");
     if (a.backend == "lockstep") return run_lockstep<Firmware>(a);
+    if (a.backend == "sim") return run_simulated<Firmware>(a);
     const Board board = load_board(a.board);
     const bool wired_for_it = board.robot == Firmware::kName;
     if (!wired_for_it) {
@@ -123,24 +150,42 @@ int run(RunArguments a) {
 
 void add_run(Subcommand app) {
   const Subcommand command =
-      app.subcommand("run", "Runs the robot: on its board, or against a physics engine");
+      app.subcommand("run", "Runs the robot: on its board, against a physics engine, or simulated")
+          .example("equipoise run --config config/mbbr.toml --backend sim --duration-s 30");
   auto a = std::make_shared<RunArguments>();
-  command.option("--config", a->config, "robot configuration, TOML").required();
-  command.option("--backend", a->backend, "board or lockstep").show_default().one_of({"board", "lockstep"});
-  command.option("--board", a->board, "wiring, TOML; see config/boards");
-  command.option("--socket", a->socket, "lockstep: where to listen, a Unix SOCK_SEQPACKET path");
+  command.option("--config", a->config, "robot configuration, TOML").file().required();
+  command
+      .option("--backend", a->backend,
+              "board; lockstep: an external physics engine; sim: our world in real time, to practise")
+      .show_default()
+      .one_of({"board", "lockstep", "sim"});
+  command.option("--board", a->board, "wiring, TOML; see config/boards").file();
+  command.option("--socket", a->socket, "lockstep: where to listen, a Unix SOCK_SEQPACKET path").file();
   command.option("--timeout-s", a->timeout_s, "lockstep: longest wait for the engine, s")
       .show_default()
       .range(0.01, 3600.0);
+  command.option("--speed", a->speed, "sim: simulated seconds per second").show_default().range(0.01, 1000.0);
+  command.option(
+      "--fault", a->faults,
+      "sim: break a part, NAME@T or NAME@T+D: at T seconds, for D seconds; an unknown name lists them");
+  a->choice.fidelity = "full";
+  command.option("--fidelity", a->choice.fidelity, "sim: which world").show_default().one_of(kFidelityNames);
+  command.option("--robot", a->robot_number, "sim: draw this robot from [population]; 0: the typical one")
+      .show_default()
+      .range(0.0, 1e12);
+  command.option("--seed", a->seed, "sim: of every random number").show_default();
   command.option("--duration-s", a->duration_s, "stop after this long, s; 0: when told to")
       .show_default()
       .range(0.0, 360000.0);
   command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second").range(-5.0, 5.0);
   command.option("--drive-mps", a->drive_mps, "drive speed, m/s").range(-2.0, 2.0);
+  command.option("--path", a->path, kPathHelp);
   const Option arm = command.flag("--arm,!--no-arm", a->arm,
-                                  "request the motors 0.5 s after the start (default: lockstep only)");
-  command.option("--command-key", a->command_key,
-                 "take commands of holders of this key (keygen, send) instead of the script");
+                                  "request the motors 0.5 s after the start (default: not on a board)");
+  command
+      .option("--command-key", a->command_key,
+              "take commands of holders of this key (keygen, send) instead of the script")
+      .file();
   command.option("--robot-name", a->robot_name, "its name for senders (default: as in the key)");
   command
       .option("--command-url", a->command_url,
@@ -151,16 +196,18 @@ void add_run(Subcommand app) {
   command.option("--controller", a->choice.controller, "state feedback (default: the robot's)");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command.option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
-  command.option("--log", a->log,
-                 "LCM event log, or off; an earlier one of this name is kept under the time it ended "
-                 "(default: logs/BACKEND-ROBOT-TIME.lcm)");
+  command
+      .option("--log", a->log,
+              "LCM event log, or off; an earlier one of this name is kept under the time it ended "
+              "(default: logs/BACKEND-ROBOT-TIME.lcm)")
+      .file();
   command.option("--log-max-mb", a->log_max_mb, "continue the log in a further file after this much, MB")
       .show_default()
       .range(1, 100000);
   command.option("--log-min-free-mb", a->log_min_free_mb, "delete the run's oldest files below this, MB")
       .show_default()
       .range(0, 1000000);
-  command.option("--json", a->json, "summary as JSON, - for stdout");
+  command.option("--json", a->json, "summary as JSON, - for stdout").file();
   command.flag("--guard,!--no-guard", a->session.guard,
                "board: a process that stops the motors when this one dies or hangs (default: yes)");
   command.flag("--realtime,!--without-realtime", a->session.realtime,
@@ -174,7 +221,7 @@ void add_run(Subcommand app) {
       .range(1, runtime::kGuardPriority - 1);
   command.option("--telemetry", a->telemetry, "LCM provider URL, or off").show_default();
   command.action([=] {
-    if (!arm.given()) a->arm = a->backend == "lockstep";
+    if (!arm.given()) a->arm = a->backend != "board";
     return run(*a);
   });
 }

@@ -4,6 +4,8 @@
 
 #include "app/run/realtime_session.hpp"
 #include "app/run/trial.hpp"
+#include "equipoise/runtime/telemetry.hpp"
+#include "robots/choice.hpp"
 
 namespace equipoise::app {
 
@@ -20,7 +22,12 @@ struct RunArguments {
   double duration_s = 0.0;
   double yaw_hz = 0.0;
   double drive_mps = 0.0;
+  std::string path;
   double timeout_s = 5.0;
+  double speed = 1.0;                 // sim: simulated seconds per second
+  std::vector<std::string> faults;    // sim: NAME@T
+  std::int64_t robot_number = 0;      // sim: of the population
+  std::uint64_t seed = 1;             // sim
   std::int64_t log_max_mb = 200;      // half an hour
   std::int64_t log_min_free_mb = 20;  // for others on the disk
   bool arm = false;

@@ -1,30 +1,36 @@
 #include <cstdio>
+#include <limits>
 
 #include "app/cli/reasons.hpp"
+#include "app/cli/version.hpp"
 #include "app/run/run_arguments.hpp"
 
 namespace equipoise::app {
 namespace {
 
+constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();  // null in JSON
+
 nlohmann::json to_json(const RunArguments& a, const std::string& robot, const Outcome& o, int trials,
                        const std::string& sha256, const nlohmann::json& session) {
   const Trial& t = o.trial;
-  nlohmann::json out{{"robot", robot},
-                     {"backend", a.backend},
-                     {"estimator", a.choice.estimator},
-                     {"controller", a.choice.controller},
-                     {"duration_s", t.duration_s()},
-                     {"ticks", t.ticks},
-                     {"armed", t.armed},
-                     {"duty_max", t.duty_max},
-                     {"saturated_fraction",
-                      t.driven > 0 ? static_cast<double>(t.saturated) / static_cast<double>(t.driven) : 0.0},
-                     {"flights", trials},
-                     {"end", o.end},
-                     {"error", o.error.empty() ? nlohmann::json(nullptr) : nlohmann::json(o.error)},
-                     {"log", o.log},
-                     {"config_sha256", sha256},
-                     {"version", version()}};
+  nlohmann::json out{
+      {"robot", robot},
+      {"backend", a.backend},
+      {"estimator", a.choice.estimator},
+      {"controller", a.choice.controller},
+      {"duration_s", t.duration_s()},
+      {"ticks", t.ticks},
+      {"armed", t.armed},
+      {"duty_max", t.driven > 0 ? t.duty_max : kNotMeasured},
+      {"saturated_fraction",
+       t.driven > 0 ? static_cast<double>(t.saturated) / static_cast<double>(t.driven) : kNotMeasured},
+      {"trials", trials},
+      {"flights", trials},  // the earlier word
+      {"end", o.end},
+      {"error", o.error.empty() ? nlohmann::json(nullptr) : nlohmann::json(o.error)},
+      {"log", o.log},
+      {"config_sha256", sha256},
+      {"version", version()}};
   t.verdict.write(&out);
   if (!session.is_null()) out.update(session);
   return out;

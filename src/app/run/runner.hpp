@@ -10,7 +10,9 @@
 #include "app/io/hardware.hpp"
 #include "app/run/panel.hpp"
 #include "app/run/run_arguments.hpp"
+#include "app/run/script.hpp"
 #include "app/run/service_notify.hpp"
+#include "app/run/trial_observer.hpp"
 #include "app/run/wires.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 
@@ -21,17 +23,6 @@ using BeginSupervision = std::function<runtime::Supervisor&(const std::atomic<bo
 
 /// Who commands, in the journal.
 inline void say_on_stderr(const std::string& what) { std::fprintf(stderr, "equipoise: %s\n", what.c_str()); }
-
-/// As in sim: motors half a second after the start, motion after a second.
-inline Command run_script(const RunArguments& a, double t_s) {
-  Command c;
-  c.arm = a.arm && t_s >= 0.5;
-  if (t_s >= 1.0) {
-    c.velocity_W_m_s = Vec2(a.drive_mps, 0.0);
-    c.yaw_rate_rad_s = 2.0 * kPi * a.yaw_hz;
-  }
-  return c;
-}
 
 /// run.lcm, run-2.lcm, run-3.lcm: a new engine is a new trial.
 inline std::string numbered(const std::string& path, int trial) {
@@ -48,7 +39,9 @@ class Runner {
       : a_(a),
         loaded_(Firmware::load(a.config, overrides)),
         config_(Firmware::apply(loaded_.config, a.choice)),
-        board_toml_(board_toml) {
+        board_toml_(board_toml),
+        script_(script_for<Firmware>(loaded_.config, a.drive_mps, 2.0 * kPi * a.yaw_hz, a.path)) {
+    script_.arm = a.arm;
     if (!a.command_key.empty()) {
       receiver_ = std::make_unique<runtime::CommandReceiver>(
           load_robot_key(a.command_key),
@@ -57,6 +50,7 @@ class Runner {
     }
   }
 
+  const typename Firmware::Config& config() const { return config_; }
   const Calibration& calibration() const { return config_.calibration; }
   const std::string& sha256() const { return loaded_.sha256; }
   void obey(Panel* panel) { panel_ = panel; }
@@ -67,7 +61,7 @@ class Runner {
     const auto commands = [&](std::int64_t tick, std::int64_t) {
       service.note(tick);
       const Command asked =
-          receiver_ ? receiver_->latest() : run_script(a_, static_cast<double>(tick) * kTickS);
+          receiver_ ? receiver_->latest() : script_.at(static_cast<double>(tick + 1) * kTickS);
       return panel_ != nullptr ? panel_->limit(asked) : asked;
     };
     Hardware hardware(io);
@@ -82,7 +76,7 @@ class Runner {
       return observe.trial(
           runtime::run_loop(hardware, pipeline, commands, on_tick, observe.done(), supervisor));
     });
-    return outcome(trial, telemetry.finish(), number);
+    return outcome(trial, telemetry.finish(trial.verdict.record()), number);
   }
 
  private:
@@ -98,7 +92,8 @@ class Runner {
     options.min_free_bytes = a_.log_min_free_mb * 1000000;
     options.sync = on_board();
     options.wait_when_full = !on_board();  // an engine may run faster than the disk
-    options.run = run_info<Firmware>(loaded_, a_.choice, 0);
+    options.run =
+        run_info<Firmware>(loaded_, a_.choice, a_.backend == "sim" ? static_cast<std::int64_t>(a_.seed) : 0);
     options.run.backend = a_.backend;
     options.run.board_toml = board_toml_;
     return options;
@@ -126,6 +121,7 @@ class Runner {
   typename Firmware::Loaded loaded_;
   typename Firmware::Config config_;
   std::string board_toml_;
+  Script script_;
   std::unique_ptr<runtime::CommandReceiver> receiver_;  // null: the script
   Panel* panel_ = nullptr;                              // null: no buttons
 };

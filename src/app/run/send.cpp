@@ -1,178 +1,25 @@
 // `equipoise send`: asks one robot for one thing, and says success only when the robot has confirmed it.
-#include <chrono>
-#include <cmath>
+#include <unistd.h>
+
 #include <cstdio>
-#include <stdexcept>
 
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
 #include "app/cli/key_file.hpp"
+#include "app/run/conversation.hpp"
 #include "app/run/wires.hpp"
-#include "equipoise/runtime/command_sender.hpp"
-#include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
 namespace {
 
-using runtime::CommandSender;
-using Clock = std::chrono::steady_clock;
-using Link = CommandSender::Link;
-
-struct Arguments {
-  std::string key;
-  std::string url = runtime::kDefaultTelemetryUrl;
-  std::string robot;
-  std::string holder;
-  double drive_mps = 0.0;
-  double sideways_mps = 0.0;
-  double yaw_hz = 0.0;
-  double duration_s = 0.2;
-  double timeout_s = 2.0;
-  bool arm = false;
-  bool disarm = false;
-  bool heading_reset = false;
-  bool drive = false;
-};
-
-Clock::time_point after(double seconds) {
-  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-}
-
-class Conversation {
- public:
-  Conversation(const Arguments& a, const runtime::CommandKeys& keys)
-      : a_(a),
-        sender_(as_input([&] { return CommandSender(keys, a.robot, a.holder); })),
-        robot_(a.robot.empty() ? keys.robot() : a.robot),
-        wire_(open_wire(a.url, runtime::WireSide::kOwner)) {}
-
-  void find_robots();
-  void disarm_all();
-  void begin_turn(std::int8_t action, const char* what);
-  void wait_until_armed();
-  std::int64_t drive();
-
- private:
-  void listen(double seconds);
-  void say(const signed_command_t& m) { runtime::say(*wire_, m); }
-  bool begin_turn(Link* link, std::int8_t action);
-  Link& robot() { return sender_.links().front(); }
-  bool confirms_more() { return robot().confirmed < robot().signed_up_to; }
-  [[noreturn]] void fail(const std::string& what) const { throw std::runtime_error(robot_ + " " + what); }
-  std::string overtaken(const Link& link) const {
-    return (link.turn_holder.empty() ? "somebody" : link.turn_holder) + " has taken over";
-  }
-
-  static constexpr double kAnswer_s = 0.5;   // on the slowest wire
-  static constexpr double kOthers_s = 0.25;  // for every robot there to have answered
-
-  const Arguments& a_;
-  CommandSender sender_;
-  std::string robot_;
-  std::unique_ptr<runtime::CommandWire> wire_;
-};
-
-void Conversation::listen(double seconds) {
-  constexpr int kPatience_ms = 10;
-  const auto end = after(seconds);
-  do {
-    wire_->listen(kPatience_ms, [this](const std::uint8_t* data, std::size_t size) {
-      command_session_t heard;
-      const auto length = static_cast<int>(size);
-      if (heard.decode(data, 0, length) == length) sender_.hear(heard);
-    });
-    while (const auto question = sender_.ask()) say(*question);
-  } while (Clock::now() < end && !interrupted.load());
-}
-
-/// And a while longer: a second one of the same name and key must not go unnoticed.
-void Conversation::find_robots() {
-  for (const auto limit = after(a_.timeout_s); sender_.links().empty(); listen(0.0)) {
-    if (Clock::now() < limit && !interrupted.load()) continue;
-    if (sender_.deaf())
-      throw std::runtime_error("a robot is heard on " + a_.url +
-                               ", but it has not the same key; has that been rotated?");
-    fail("is not heard on " + a_.url + " (it needs equipoise run --command-key FILE)");
-  }
-  if (a_.disarm) return;  // at once
-  listen(kOthers_s);
-  if (sender_.links().size() > 1)
-    throw std::runtime_error("two robots with this key answer as " + robot_ +
-                             ": give each its own (equipoise run --robot-name, or keygen)");
-}
-
-/// One arm, disarm or heading reset of the turn that is now, repeated until the robot has begun the next.
-/// False: somebody else was faster.
-bool Conversation::begin_turn(Link* link, std::int8_t action) {
-  const std::int64_t turn = link->turn;
-  const std::int64_t first = link->signed_up_to + 1;
-  for (const auto limit = after(a_.timeout_s); link->turn == turn;) {
-    if (Clock::now() > limit || interrupted.load()) fail("confirms nothing");
-    say(sender_.sign(link, turn, action));
-    for (const auto next = after(wire_->interval_s()); Clock::now() < next && link->turn == turn;)
-      listen(0.0);
-  }
-  return sender_.began_turn(*link, first);
-}
-
-void Conversation::begin_turn(std::int8_t action, const char* what) {
-  if (!begin_turn(&robot(), action)) fail("did not " + std::string(what) + ": " + overtaken(robot()));
-}
-
-void Conversation::wait_until_armed() {
-  const std::int64_t turn = robot().turn;
-  for (const auto limit = after(a_.timeout_s); robot().state != command_session_t::ARMED; listen(0.0)) {
-    if (robot().turn != turn) fail("did not arm: " + overtaken(robot()));
-    if (robot().state != command_session_t::WAITING || Clock::now() > limit)
-      fail("does not arm; its log, its LEDs and equipoise doctor say why");
-  }
-}
-
-/// Whoever disarms wants it off: an arm in between is answered by the next disarm. Of two robots with one
-/// name and key, both.
-void Conversation::disarm_all() {
-  const auto others = after(kOthers_s);
-  const auto limit = after(a_.timeout_s);
-  for (std::size_t i = 0; i < sender_.links().size() || Clock::now() < others;) {
-    if (i == sender_.links().size()) {
-      listen(0.0);
-      continue;
-    }
-    const bool ours = begin_turn(&sender_.links()[i], signed_command_t::DISARM);
-    while (ours && sender_.links()[i].state == command_session_t::WAITING && Clock::now() < limit)
-      listen(0.0);
-    if (sender_.links()[i].state == command_session_t::OFF) {
-      ++i;
-    } else if (Clock::now() > limit) {
-      fail("has taken the disarm, but its motors are not off");
-    }
-  }
-}
-
-std::int64_t Conversation::drive() {
-  const std::int64_t turn = robot().turn;
-  const CommandSender::Motion motion{{a_.drive_mps, a_.sideways_mps}, 2.0 * kPi * a_.yaw_hz};
-  const auto end = after(a_.duration_s);
-  auto silent = after(a_.timeout_s);
-  for (std::int64_t sent = 1;; ++sent) {
-    const std::int64_t confirmed = robot().confirmed;
-    say(sender_.sign(&robot(), turn, signed_command_t::DRIVE, motion));
-    listen(wire_->interval_s());
-    const bool last = Clock::now() >= end || interrupted.load();
-    for (const auto limit = after(kAnswer_s); last && confirms_more(); listen(0.0)) {
-      if (Clock::now() > limit) break;  // one was lost: say it again
-    }
-    if (robot().turn != turn) fail("drives no more as told: " + overtaken(robot()));
-    if (robot().confirmed > confirmed) silent = after(a_.timeout_s);
-    if (last && !confirms_more()) return sent;
-    if (Clock::now() > silent) fail("took none or not all of " + std::to_string(sent) + " commands");
-  }
-}
-
-int send(const Arguments& a) {
+int send(const SendArguments& a) {
   Conversation conversation(a, load_key(a.key));
   watch_interrupts();
   conversation.find_robots();
+  if (a.live) {
+    conversation.relay(STDIN_FILENO);
+    return 0;
+  }
   if (a.disarm) {
     conversation.disarm_all();
     std::printf("disarmed\n");
@@ -191,9 +38,10 @@ int send(const Arguments& a) {
 }  // namespace
 
 void add_send(Subcommand app) {
-  const Subcommand command = app.subcommand("send", "Commands a robot that runs with --command-key");
-  auto a = std::make_shared<Arguments>();
-  command.option("--key", a->key, "key file, see keygen").required();
+  const Subcommand command = app.subcommand("send", "Commands a robot that runs with --command-key")
+                                 .example("equipoise send --key anna.key --drive-mps 0.1 --duration-s 5");
+  auto a = std::make_shared<SendArguments>();
+  command.option("--key", a->key, "key file, see keygen").file().required();
   command.option("--url", a->url, std::string("the robot's --command-url: ") + kWireHelp).show_default();
   command.option("--robot", a->robot, "the robot's --robot-name (default: as in the key)");
   command.option("--as", a->holder, "your name, with a robot's own key (default: owner)");
@@ -209,8 +57,14 @@ void add_send(Subcommand app) {
   command.option("--timeout-s", a->timeout_s, "longest wait for the robot, s")
       .show_default()
       .range(0.1, 60.0);
+  const Option live =
+      command.flag("--live", a->live,
+                   "lines from stdin: arm, disarm, heading-reset, take, or drive FORWARD LEFT "
+                   "YAW (m/s, m/s, turns/s) for one command; its state as JSON lines");
   command.action([=] {
     const bool motion = forward.given() || sideways.given() || yaw.given();
+    if (live.given() && (motion || arm.given() || a->heading_reset || duration.given()))
+      throw InputError("--live: what to do comes from stdin");
     a->disarm = arm.given() && !a->arm;
     if (a->disarm && (motion || a->heading_reset))
       throw InputError("--disarm: a robot that is off goes nowhere");

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/cli/json.hpp"
 #include "app/cli/reasons.hpp"
 
 namespace equipoise::app {
@@ -38,7 +39,7 @@ void VerdictJudge::observe(const Tick& tick) noexcept {
     lose(tick.true_tilt_rad > kFallenTilt_rad || falling(tick) ? Ended::kFell : Ended::kDisarmed, tick);
 }
 
-Verdict VerdictJudge::verdict(bool interrupted, bool device_failed) const noexcept {
+Verdict VerdictJudge::verdict(bool stopped, bool device_failed) const noexcept {
   Verdict out = verdict_;
   if (lost_) return out;
   if (device_failed) {
@@ -46,7 +47,7 @@ Verdict VerdictJudge::verdict(bool interrupted, bool device_failed) const noexce
   } else if (refused_) {
     out.ended = Ended::kDisarmed;
     out.fell_at_s = out.duration_s;
-  } else if (interrupted) {
+  } else if (stopped) {
     out.ended = Ended::kInterrupted;
   }
   return out;
@@ -80,6 +81,20 @@ void Verdict::write(nlohmann::json* out) const {
   (*out)["reasons"] = reason_names(reasons);
   (*out)["fell"] = fell();
   (*out)["fell_at_s"] = fell() ? nlohmann::json(fell_at_s) : nlohmann::json(nullptr);
+}
+
+runtime::EndRecord Verdict::record() const noexcept {
+  return {static_cast<std::int32_t>(ended), reasons, fell() ? fell_at_s : std::nan(""), duration_s};
+}
+
+Verdict Verdict::of(const runtime::EndRecord& record) noexcept {
+  Verdict out;
+  if (record.ended > 0 && record.ended < static_cast<std::int32_t>(kEndedNames.size()))
+    out.ended = static_cast<Ended>(record.ended);
+  out.reasons = record.reasons;
+  if (out.fell()) out.fell_at_s = record.fell_at_s;
+  out.duration_s = record.duration_s;
+  return out;
 }
 
 }  // namespace equipoise::app

@@ -5,9 +5,10 @@
 
 #include <array>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "app/cli/json.hpp"
+#include "equipoise/runtime/record.hpp"
 
 namespace equipoise::app {
 
@@ -30,6 +31,10 @@ struct Verdict {
   std::string sentence() const;
   /// Adds ended, reasons, fell, fell_at_s.
   void write(nlohmann::json* out) const;
+
+  /// As in a log.
+  runtime::EndRecord record() const noexcept;
+  static Verdict of(const runtime::EndRecord& record) noexcept;
 };
 
 class VerdictJudge {
@@ -52,7 +57,7 @@ class VerdictJudge {
   bool refused() const noexcept { return refused_; }
   bool armed() const noexcept { return armed_; }
 
-  Verdict verdict(bool interrupted, bool device_failed) const noexcept;
+  Verdict verdict(bool stopped, bool device_failed) const noexcept;
 
  private:
   void lose(Ended how, const Tick& tick) noexcept;

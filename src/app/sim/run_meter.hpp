@@ -8,14 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "app/run/path.hpp"
 #include "app/run/verdict.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise::app {
 
-/// When the drive starts, s; before it the robot balances in place. Motors are requested at kArmAt.
-inline constexpr double kArmAt_s = 0.5;
-inline constexpr double kDriveFrom_s = 1.0;
 /// Errors count from here on.
 inline constexpr double kSettled_s = 5.0;
 
@@ -29,9 +27,11 @@ struct EstimatorErrors {
 struct SimSummary {
   Verdict verdict;
   EstimatorErrors controlling;
-  double yaw_frame_speed_rmse_m_s = kUncounted;  // of rolling, without what a wrong heading adds
-  double heading_error_rad = kUncounted;         // estimate minus truth, at the end
-  double position_rmse_m = kUncounted;
+  double yaw_frame_speed_rmse_m_s = kUncounted;    // of rolling, without what a wrong heading adds
+  double heading_error_rad = kUncounted;           // estimate minus truth, at the end
+  double position_rmse_m = kUncounted;             // against the reference
+  double path_rmse_m = kUncounted;                 // against the path, from its start
+  double normalized_innovation_mean = kUncounted;  // 1 for a consistent filter
   double yaw_rate_mean_hz = kUncounted;
   double duty_max = 0.0;
   double saturated_fraction = 0.0;
@@ -51,8 +51,11 @@ class RunMeter {
   void controlling(const StateErrors& e) { controlling_.add(e); }
   void compared(std::size_t i, const StateErrors& e) { compared_[i].add(e); }
   void path(double time_s, const StateView& reference, const StateView& truth);
+  /// `forward_W_m`: where the robot truly is, its first heading along x.
+  void following(const PathPoint& path, const Vec2& forward_W_m);
   /// The controlling estimate in its own yaw frame.
   void rolling(const StateView& estimate, const StateView& truth, int axes);
+  void innovation(const StateView& estimate);
   void heading(const StateView& estimate, const StateView& truth);
 
   SimSummary summary(const Verdict& verdict, std::int64_t ticks, double wall_s) const;
@@ -66,6 +69,7 @@ class RunMeter {
       count_ += axes;
     }
     double value() const;
+    bool empty() const { return count_ == 0; }
 
    private:
     double sum_ = 0.0;
@@ -87,7 +91,11 @@ class RunMeter {
   std::vector<Errors> compared_;
   double rolling_radius_m_;
   Rms position_;
+  Rms following_;
+  Vec2 path_start_W_m_ = Vec2::Zero();
   Rms rolling_;
+  double innovation_sum_ = 0.0;
+  std::int64_t innovations_ = 0;
   double heading_error_ = kUncounted;
   double yaw_from_ = 0.0;
   double yaw_from_s_ = -1.0;

@@ -7,13 +7,13 @@
 #include <functional>
 
 #include "app/run/firmware.hpp"
+#include "app/run/script.hpp"
 #include "app/sim/run_meter.hpp"
 
 namespace equipoise::app {
 
 struct SimOptions {
-  double yaw_rate_rad_s = 0.0;
-  double drive_mps = 0.0;
+  Script script;
   double duration_s = 30.0;
   std::uint64_t seed = 1;
   const std::atomic<bool>* log_failed = nullptr;  // then the motors stop: nothing runs unrecorded
@@ -21,8 +21,8 @@ struct SimOptions {
 
 using TickObserver = std::function<void(const runtime::TickRecord&)>;
 
-/// `choice.fidelity` names the world, `choice.controller` the pipeline. Defined in fly.hpp, instantiated once
-/// per robot in simulate_*.cpp.
+/// `choice.fidelity` names the world, `choice.controller` the pipeline. Defined in simulated_run.hpp,
+/// instantiated once per robot in simulate_*.cpp.
 template <class Firmware>
 SimSummary simulate(const typename Firmware::Config& configured, const Choice& choice,
                     const SimOptions& options, const TickObserver& observe, const std::atomic<bool>& stop);

@@ -1,4 +1,4 @@
-#include "app/sim/fly.hpp"
+#include "app/sim/simulated_run.hpp"
 
 namespace equipoise::app {
 

@@ -4,7 +4,8 @@
 namespace equipoise::app {
 
 void add_attitude(Subcommand app) {
-  const Subcommand command = app.subcommand("attitude", "Runs our attitude filter on rows of IMU samples");
+  const Subcommand command = app.subcommand("attitude", "Runs our attitude filter on rows of IMU samples")
+                                 .example("equipoise attitude --in samples.json --json -");
   auto in = std::make_shared<std::string>();
   auto json = std::make_shared<std::string>("-");
   auto rate_hz = std::make_shared<double>(kTickHz);

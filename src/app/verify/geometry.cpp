@@ -5,7 +5,8 @@ namespace equipoise::app {
 
 void add_geometry(Subcommand app) {
   const Subcommand command =
-      app.subcommand("geometry", "Orthogonal omniwheel placement: tilt, axes, load, torque shares");
+      app.subcommand("geometry", "Orthogonal omniwheel placement: tilt, axes, load, torque shares")
+          .example("equipoise geometry --alpha-deg 60");
   auto alpha_deg = std::make_shared<double>(60.0);
   auto azimuth_deg = std::make_shared<double>(-140.0);
   auto json = std::make_shared<std::string>();
@@ -15,7 +16,7 @@ void add_geometry(Subcommand app) {
   command.option("--azimuth-deg", *azimuth_deg, "rotation of all wheels about the vertical")
       .show_default()
       .range(-180.0, 180.0);
-  command.option("--json", *json, "output file, - for stdout");
+  command.option("--json", *json, "output file, - for stdout").file();
   command.action([=] {
     const double degrees = kPi / 180.0;
     const double alpha = *alpha_deg * degrees;

@@ -62,7 +62,8 @@ const std::map<std::string, Model>& models() {
 
 void add_model(Subcommand app) {
   const Subcommand command =
-      app.subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON");
+      app.subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON")
+          .example("equipoise model --robot mbbr --in rows.json --json -");
   auto robot = std::make_shared<std::string>();
   auto in = std::make_shared<std::string>();
   auto json = std::make_shared<std::string>("-");
@@ -72,7 +73,7 @@ void add_model(Subcommand app) {
               "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
               "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}")
       .required();
-  command.option("--json", *json, "output file, - for stdout").show_default();
+  command.option("--json", *json, "output file, - for stdout").file().show_default();
   command.action([=] {
     write_json(map_rows(*in, models().at(*robot)), *json);
     return 0;

@@ -1,6 +1,7 @@
 #include "robots/mbbr/config.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "config/common_config.hpp"
 
@@ -65,7 +66,10 @@ MbbrReferenceParams read_reference(Section s, double ball_radius_m) {
       s.choice("rate_feedback", {"body", "euler"}) == 0 ? RateFeedback::kBody : RateFeedback::kEuler;
   p.frame = s.choice("filter_frame", {"inertial", "yaw"}) == 0 ? FilterFrame::kInertial : FilterFrame::kYaw;
   p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
+  p.max_jerk_m_s3 = s.number("max_jerk_m_s3", 0.01, 1e9);
   p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
+  p.floor_yaw_acceleration_rad_s2 = s.number("floor_yaw_acceleration_rad_s2", 0.01, 1000.0);
+  p.budget.share = s.number("duty_share", 0.05, 1.0);
   p.ball_radius_m = ball_radius_m;
   p.schedule =
       read_schedule<MbbrReferenceParams::kColumns>(s, "schedule", {"slc_gain", "slc_pole", "low_pass_rad_s"});
@@ -170,11 +174,16 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   c.estimators.robot = c.robot;
 
   c.reference = read_reference(root.table("reference"), c.robot.r);
+  c.reference.feasible_acceleration_m_s2 = feasible_acceleration_m_s2(c.robot);
+  c.reference.budget = mbbr_duty_budget(c.robot, c.reference.budget.share, c.friction.gain);
   Section controller = root.table("controller");
   c.thesis = read_thesis(controller.table("thesis"));
   Section scheduled = controller.table("scheduled");
   c.scheduled.yaw_feedforward = scheduled.boolean("yaw_feedforward");
   c.design = read_design(scheduled.table("design"));
+  if (const auto problem = design_problem(c.robot, c.design, c.motor.k1()))
+    (problem->parameter.empty() ? scheduled.fail("design", problem->why)
+                                : robot.fail(problem->parameter, problem->why));
   c.scheduled.gains = design_mbbr(c.robot, c.design);
   scheduled.finish();
   controller.finish();
@@ -192,6 +201,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   world.finish();
   if (root.has("population")) root.table("population");  // read when a robot is drawn
   root.finish();
+  loaded.keys = document.keys();
   loaded.sha256 = document.sha256();
   loaded.toml = document.canonical();
   return loaded;
@@ -203,12 +213,18 @@ Loaded<MbbrConfig> load_mbbr(const std::string& path, const Overrides& overrides
   return read_mbbr(Document(path, overrides));
 }
 
-Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin) {
-  return read_mbbr(Document::parse(text, origin));
+Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin,
+                              const std::vector<std::string>& set) {
+  return read_mbbr(Document::parse(text, origin, set));
 }
 
 MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {
-  return {robot, calibration, estimators, reference, thesis, friction, motor, safety, attitude};
+  MbbrReferenceParams as_printed = reference;  // commands pass as they are, [T] section 6.2.1
+  as_printed.max_jerk_m_s3 = std::numeric_limits<double>::infinity();
+  as_printed.floor_yaw_acceleration_rad_s2 = std::numeric_limits<double>::infinity();
+  as_printed.budget = DutyBudget{};
+  as_printed.feasible_acceleration_m_s2 = std::numeric_limits<double>::infinity();
+  return {robot, calibration, estimators, as_printed, thesis, friction, motor, safety, attitude};
 }
 
 MbbrScheduledPipeline::Params MbbrConfig::scheduled_pipeline() const {

@@ -42,7 +42,8 @@ struct MbbrConfig {
 };
 
 Loaded<MbbrConfig> load_mbbr(const std::string& path, const Overrides& overrides);
-/// From text, e.g. of a log; `origin` names it in errors.
-Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin);
+/// From text, e.g. of a log; `origin` names it in errors. `set`: as of --set.
+Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin,
+                              const std::vector<std::string>& set = {});
 
 }  // namespace equipoise

@@ -44,6 +44,13 @@ Jacobians jacobians(const MbbrParameters& p, double yaw_rate_rad_s) {
 
 double weight(double deviation) { return 1.0 / (deviation * deviation); }
 
+/// Lean and u per rad/s^2 of ball acceleration, from the model at rest.
+Vec2 steady_motion(const MbbrLinear& rest) {
+  Eigen::Matrix2d balance;
+  balance << rest.A(2, 0).real(), rest.b(2, 0).real(), rest.A(3, 0).real(), rest.b(3, 0).real();
+  return balance.partialPivLu().solve(Vec2(0.0, 1.0));
+}
+
 CMatrix yaw_lqr(const MbbrParameters& p, const MbbrDesignParams& d) {
   const Jacobians J = jacobians(p, 0.0);
   CMatrix A = CMatrix::Zero(2, 2);
@@ -90,6 +97,55 @@ CMatrix mbbr_lqr(const MbbrParameters& p, const MbbrDesignParams& d, double yaw_
       Vec<1>(weight(d.u)));
 }
 
+std::optional<DesignProblem> design_problem(const MbbrParameters& p, const MbbrDesignParams& d,
+                                            double wheel_torque_N_m) {
+  // What a body of one piece can be; generous: Table 5.2 has 1.5, 0.55, 1.0, 1.0.
+  const double gyration_m = std::sqrt(0.5 * (p.I_t1 + p.I_t2) / p.m_t);
+  if (auto bad =
+          outside("com_height_m", "height over the body's radius of gyration", p.l / gyration_m, 0.2, 5.0))
+    return bad;
+  if (auto bad = outside("ball_inertia_kg_m2", "inertia over mass x radius^2", p.I_b / (p.m_b * p.r * p.r),
+                         0.1, 1.5))
+    return bad;
+  if (auto bad = outside("wheel_radius_m", "over the ball's", p.r_w / p.r, 0.05, 1.0)) return bad;
+  if (auto bad =
+          outside("k1_N_m", "over the torque of a motor of [motor]", p.k1 / wheel_torque_N_m, 0.3, 3.0))
+    return bad;
+
+  for (const double yaw_rate : {0.0, 2.0 * kPi * d.last_hz}) {
+    const MbbrLinear s = mbbr_linear(p, yaw_rate);
+    if (auto bad = beyond_recovery(s.A, s.b, 0)) return bad;
+    const CMatrix K = mbbr_lqr(p, d, yaw_rate);
+    if (auto bad = without_margin(sampled(s.A, s.b, kTickS, d.input_delay_s), K)) return bad;
+  }
+  return std::nullopt;
+}
+
+double feasible_acceleration_m_s2(const MbbrParameters& p) {
+  const MbbrLinear s = mbbr_linear(p, 0.0);
+  return recoverable(s.A, s.b, 0).limit / 3.0 / steady_motion(s).x() * p.r;
+}
+
+DutyBudget mbbr_duty_budget(const MbbrParameters& p, double share, double friction_share) {
+  const MbbrKinematics kinematics(p);
+  double about_z = 0.0;       // largest duty of a wheel per unit of u_z,
+  double horizontally = 0.0;  // and per unit of u in the plane, in its worst direction
+  const Vec3 z = kinematics.wheels_from_axes(Vec3::UnitZ());
+  const Vec3 x = kinematics.wheels_from_axes(Vec3::UnitX());
+  const Vec3 y = kinematics.wheels_from_axes(Vec3::UnitY());
+  for (int i = 0; i < Mbbr::kWheels; ++i) {
+    about_z = std::max(about_z, std::abs(z(i)));
+    horizontally = std::max(horizontally, std::hypot(x(i), y(i)));
+  }
+  const double against_back_emf = (p.k2_ball + p.mu_v) / p.k1;
+  DutyBudget b;
+  b.share = share;
+  b.of_friction = friction_share * p.mu_c / p.k1 * std::max(about_z, horizontally);
+  b.per_yaw_rate = about_z * against_back_emf;
+  b.per_speed = horizontally * against_back_emf / p.r;
+  return b;
+}
+
 MbbrGains design_mbbr(const MbbrParameters& p, const MbbrDesignParams& d) {
   MbbrGains g;
   const std::size_t rows = static_cast<std::size_t>(std::lround(d.last_hz / d.step_hz)) + 1;
@@ -103,13 +159,9 @@ MbbrGains design_mbbr(const MbbrParameters& p, const MbbrDesignParams& d) {
       g.schedule.row[i][2 * k + 1] = gain.imag();
     }
   }
-  // Steady motion at rest: the lean and u that a ball acceleration needs, the u that a ball rate needs.
   const MbbrLinear rest = mbbr_linear(p, 0.0);
-  Eigen::Matrix2d balance;
-  balance << rest.A(2, 0).real(), rest.b(2, 0).real(), rest.A(3, 0).real(), rest.b(3, 0).real();
-  const Vec2 lean_and_drive = balance.partialPivLu().solve(Vec2(0.0, 1.0));
-  g.lean = lean_and_drive(0);
-  g.drive = lean_and_drive(1);
+  g.lean = steady_motion(rest).x();
+  g.drive = steady_motion(rest).y();
   g.speed = (-rest.A(2, 3) / rest.b(2, 0)).real();
   const MbbrLinear turning = mbbr_linear(p, 1.0);
   g.speed_turn = (turning.A(2, 3) / turning.b(2, 0)).imag();

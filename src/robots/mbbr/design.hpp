@@ -4,6 +4,8 @@
 #pragma once
 
 #include "equipoise/control/gain_schedule.hpp"
+#include "equipoise/control/governor.hpp"
+#include "equipoise/control/plausible.hpp"
 #include "equipoise/control/riccati.hpp"
 #include "robots/mbbr/mbbr.hpp"
 
@@ -26,8 +28,9 @@ struct MbbrDesignParams {
 
 /// u = theta d_theta + phi d_phi + body_rate d_body_rate + phi_dot d_phi_dot + u_before d_u_before
 ///     + (speed - i speed_turn theta_z') ref_phi_dot + drive ref_phi_ddot,
-/// d = estimate - reference in the yaw frame; theta_ref = lean ref_phi_ddot, body rate ref. 0; ref_phi_ddot
-/// is the inertial acceleration of the reference ball angles, resolved in the yaw frame. The schedule holds
+/// d = estimate - reference in the yaw frame; theta_ref = lean ref_phi_ddot, body rate ref. its
+/// inertial rate; ref_phi_ddot is the inertial acceleration of the reference ball angles, resolved in the yaw
+/// frame. The schedule holds
 /// yaw rates >= 0; for negative ones take the complex conjugates.
 struct MbbrGains {
   enum Gain : std::size_t { kTheta, kPhi, kBodyRate, kPhiDot, kUBefore, kGains };
@@ -52,6 +55,16 @@ MbbrLinear mbbr_linear(const MbbrParameters& p, double yaw_rate_rad_s);
 
 /// K of u = -K (states, u before) at one yaw rate.
 CMatrix mbbr_lqr(const MbbrParameters& p, const MbbrDesignParams& d, double yaw_rate_rad_s);
+
+/// What keeps this robot from being balanced, if anything; `wheel_torque_N_m`: of one stalled motor.
+std::optional<DesignProblem> design_problem(const MbbrParameters& p, const MbbrDesignParams& d,
+                                            double wheel_torque_N_m);
+
+/// Acceleration whose lean takes a third of the tilt that the full torque can bring back.
+double feasible_acceleration_m_s2(const MbbrParameters& p);
+
+/// What steady motion takes of each wheel's duty; `friction_share`: of Coulomb friction that is compensated.
+DutyBudget mbbr_duty_budget(const MbbrParameters& p, double share, double friction_share);
 
 MbbrGains design_mbbr(const MbbrParameters& p, const MbbrDesignParams& d);
 

@@ -4,6 +4,18 @@
 #include <algorithm>
 
 namespace equipoise {
+namespace {
+
+/// Of each wheel's angle, in turns of its rollers: its sign chooses the row, and it makes the ripple.
+Vec3 roller_sines(double rollers_per_turn, const Vec3& wheel_angle_rad) noexcept {
+  return (rollers_per_turn * wheel_angle_rad).array().sin();
+}
+
+Vec3 rows_of(const Vec3& sines) noexcept {
+  return (sines.array() >= 0.0).select(Vec3::Ones(), -Vec3::Ones());
+}
+
+}  // namespace
 
 Mat3 wheel_contacts(const MbbrParameters& robot) noexcept {
   const double alpha = robot.alpha_deg * kPi / 180.0;
@@ -17,9 +29,7 @@ Mat3 wheel_contacts(const MbbrParameters& robot) noexcept {
 }
 
 Vec3 roller_rows(double rollers_per_turn, const Vec3& wheel_angle_rad) noexcept {
-  Vec3 rows;
-  for (int i = 0; i < 3; ++i) rows(i) = std::sin(rollers_per_turn * wheel_angle_rad(i)) >= 0.0 ? 1.0 : -1.0;
-  return rows;
+  return rows_of(roller_sines(rollers_per_turn, wheel_angle_rad));
 }
 
 double grip_limit_N_m(double wheel_grip, const MbbrParameters& robot) noexcept {
@@ -40,6 +50,8 @@ MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p)
       grip_N_m_(Vec3::Constant(grip_limit_N_m(p.wheel_grip, robot))),
       contacts_(wheel_contacts(robot)),
       loads_from_force_(contacts_.inverse()),
+      middle_(std::cos(p.roller_tilt_rad) * kinematics_.T_ob()),
+      to_row_(std::sin(p.roller_tilt_rad) * contacts_),
       tilted_(kinematics_.T_ob()) {
   for (int i = 0; i < Mbbr::kWheels; ++i) {
     const Vec3 axis = kinematics_.T_ob().col(i);
@@ -63,13 +75,10 @@ Vec3 MbbrDrive::contact_torques(const Vec3& wheel_torque, const Vec3& friction_B
 
 void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, const Vec3& wheel_angle_rad,
                            double step_s) noexcept {
-  if (tilts()) {
-    const Vec3 rows = roller_rows(p_.rollers_per_turn, wheel_angle_rad);
-    tilted_ = std::cos(p_.roller_tilt_rad) * kinematics_.T_ob() +
-              std::sin(p_.roller_tilt_rad) * contacts_ * rows.asDiagonal();
-  }
-  if (p_.roller_slip_N_m != 0.0) {
-    ripple_N_m_ = p_.roller_slip_N_m * (p_.rollers_per_turn * wheel_angle_rad).array().sin().matrix();
+  if (tilts() || p_.roller_slip_N_m != 0.0) {
+    const Vec3 sines = roller_sines(p_.rollers_per_turn, wheel_angle_rad);
+    if (tilts()) tilted_ = middle_ + to_row_ * rows_of(sines).asDiagonal();
+    ripple_N_m_ = p_.roller_slip_N_m * sines;
   }
   if (p_.gear.play_rad != 0.0) {
     Vec3 motor_rate = wheel_rates(relative_rate_B);

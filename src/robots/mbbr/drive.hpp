@@ -75,6 +75,8 @@ class MbbrDrive {
   Mat3 contacts_;  // normals, columns
   Mat3 pushes_;    // directions in which the wheels push the ball, columns
   Mat3 loads_from_force_;
+  Mat3 middle_;  // of the axes of both rows, columns
+  Mat3 to_row_;  // from there to the outer row's
   Mat3 tilted_;  // axes of the rows that carry now, columns
   Vec3 engaged_ = Vec3::Ones();
   Vec3 ripple_N_m_ = Vec3::Zero();

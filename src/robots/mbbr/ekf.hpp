@@ -1,23 +1,25 @@
-// The MBBR's default filter: the corrected model, discretised by the midpoint rule, with what differs from
-// robot to robot as states: the IMU's mount, gyro bias and torques that the model does not know. In:
-// Measurement, the input applied since the last one -> out: state at the sample's time, normalised innovation
-// of every row, variances. Encoders enter wheel by wheel, so that a lost wheel is a skipped row; missed ticks
-// are predicted. Source: docs/derivation.md; [T] 5.1.6, 6.1. RT-safe.
+// The MBBR's default filter: the corrected model, discretised by Heun's third-order rule, with what differs
+// from robot to robot as states: the IMU's mount, gyro bias, radii, torques that the model does not know.
+// In: Measurement, the input applied since the last one -> out: state at the sample's time, normalised
+// innovation of every row, variances. Encoders enter wheel by wheel, so that a lost wheel is a skipped row;
+// missed ticks are predicted. Source: docs/derivation.md; [T] 5.1.6, 6.1. RT-safe.
 #pragma once
 
-#include "equipoise/estimate/kalman.hpp"
+#include "equipoise/estimate/packed_filter.hpp"
 #include "equipoise/estimate/time_base.hpp"
+#include "generated/mbbr_filter.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/mbbr.hpp"
 
 namespace equipoise {
 
-/// States: the 10 observable ones; mount angles about body x, y (sensor against body); gyro bias x, y;
-/// disturbance of u, its x, y standing in the inertial frame. Bias z: from rest only, in motion roller tilt
-/// fakes yaw.
+/// States: the 10 observable ones; mount angles about body x, y (sensor against body); gyro bias x, y; how
+/// much more the wheels turn than the configured radii say; disturbance of u, its x, y standing in the
+/// inertial frame. The encoders' sums e are as counted, so that a change of the scale leaves them alone.
+/// Bias z: from rest only, in motion roller tilt fakes yaw.
 class MbbrEkfModel {
  public:
-  static constexpr int kStates = 17;
+  static constexpr int kStates = 18;
   static constexpr int kInputs = 3;
   static constexpr int kOutputs = 8;
   enum State : int {
@@ -33,14 +35,17 @@ class MbbrEkfModel {
     kMountY,
     kBiasX,
     kBiasY,
+    kWheelScale,  // r / r_w of the robot over the configured one, less 1
     kDisturbance
   };
   enum Output : int { kGyro, kWheel = 3, kAccel = 6 };  // three, three, two rows
 
   MbbrEkfModel(const MbbrParameters& p, double disturbance_time_constant_s);
-  void predict(const Vec<17>& x, const Vec3& u, Vec<17>& x_next, Mat<17, 17>& F) const noexcept;
-  Mat<17, 3> input_matrix() const noexcept;
-  void measure(const Vec<17>& x, const Vec3& u, Vec<8>& y, Mat<8, 17>& H) const noexcept;
+  void predict(const Vec<18>& x, const Vec3& u, Vec<18>& x_next, Mat<18, 18>& F) const noexcept;
+  Mat<18, 3> input_matrix() const noexcept;
+  void measure(const Vec<18>& x, const Vec3& u, Vec<8>& y, Mat<8, 18>& H) const noexcept;
+  /// For the generated form of the filter, noises left open.
+  generated::MbbrFilter::Constants constants() const noexcept;
   /// The observable states after dt, without a Jacobian.
   MbbrObservable::State ahead(const MbbrObservable::State& x, const Vec3& u, double dt) const noexcept;
 
@@ -52,11 +57,14 @@ class MbbrEkfModel {
   Mat<10, 3> B_;
 };
 
+extern template class PackedFilter<MbbrEkfModel, generated::MbbrFilter>;
+
 class MbbrEkf {
  public:
   using Model = MbbrEkfModel;
+  using Filter = PackedFilter<Model, generated::MbbrFilter>;
   struct Params {
-    KalmanFilter<Model>::Params filter;
+    Filter::Params filter;
     double disturbance_time_constant_s = 1.0;
     double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
     double push_nis = 6.0;      // more than this in a tick is a push: the rates are in doubt by
@@ -77,16 +85,19 @@ class MbbrEkf {
   MbbrEstimate estimate() const noexcept;
   Vec3 wheel_rate_rad_s() const noexcept;
 
-  const Vec<17>& x() const noexcept { return filter_.x(); }
-  const Mat<17, 17>& P() const noexcept { return filter_.P(); }
+  const Vec<18>& x() const noexcept { return filter_.x(); }
+  Mat<18, 18> P() const noexcept { return filter_.P(); }
   /// gyro x, y, z, wheels, accelerometer x, y: squared innovation over its variance; 0 where not used.
   const std::array<double, 8>& row_nis() const noexcept { return filter_.row_nis(); }
-  double tilt_sigma_rad() const noexcept { return std::sqrt(P()(0, 0) + P()(1, 1)); }
+  const std::array<double, 8>& row_innovation() const noexcept { return filter_.row_innovation(); }
+  double tilt_sigma_rad() const noexcept {
+    return std::sqrt(filter_.variance(Model::kThetaX) + filter_.variance(Model::kThetaY));
+  }
 
  private:
   Params params_;
   MbbrKinematics kinematics_;
-  KalmanFilter<Model> filter_;
+  Filter filter_;
   TimeBase<3, 3> time_;
   double gyro_bias_z_ = 0.0;
   double heading_ = 0.0;

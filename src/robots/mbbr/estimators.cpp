@@ -1,13 +1,38 @@
 #include "robots/mbbr/estimators.hpp"
 
+#include <Eigen/LU>
+
 namespace equipoise {
 namespace {
+
+constexpr double kMountError_rad = 0.0016;  // 0.01 rad/s at 1 Hz: no sound robot of 201 to 360 strays further
 
 template <class Filter, std::size_t M>
 void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
           const std::array<bool, M>& use) noexcept {
   filter.predict(u);
   filter.update(u, y, use);
+}
+
+/// Torque between body and ball turns both: what it does to the body's rates per wheel rate.
+GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
+  const MbbrEkfModel model(params.robot, params.ekf.disturbance_time_constant_s);
+  const MbbrKinematics kinematics(params.robot);
+  const Mat<10, 3> B = model.input_matrix().topRows<10>();
+  Mat3 wheels;
+  for (int i = 0; i < 3; ++i)
+    wheels.col(i) = kinematics.wheels_from_ball(MbbrObservable::encoder_rate_B(B.col(i)));
+  const Mat3 body = B.middleRows<3>(MbbrEkfModel::kThetaDotX);
+  GyroWatchParams<3> p;
+  p.from_wheels = body * wheels.inverse();
+  p.sigma_rad_s = {0.045, 0.045, 0.18};  // encoder counts, gravity, play: measured on robots 1 to 8
+  p.max_step_rad_s =
+      Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
+  p.balances = {true, true, false};
+  p.by_rate = {false, false, true};  // the ball does not spin about the vertical
+  for (int i = 0; i < 3; ++i)
+    p.rate_from_wheels(2, i) = -kinematics.ball_from_wheels(Vec3(Vec3::Unit(i))).z();
+  return p;
 }
 
 double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * kPi); }
@@ -19,6 +44,7 @@ MbbrEstimators::MbbrEstimators(const Params& params)
       kinematics_(params.robot),
       ekf_(params.robot, params.ekf),
       isolation_(ekf_),
+      gyro_watch_(gyro_watch(params)),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(MbbrLinearModel(params.robot, params.kf_yaw_transport), params.kf) {}
@@ -29,6 +55,9 @@ void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
 
   ekf_.start(tilt, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
   isolation_.reset();
+  gyro_watch_.reset();
+  dead_encoders_.reset();
+  bias_drift_.reset(ekf_.x().segment<2>(MbbrEkfModel::kBiasX));
 
   Vec<13> x13 = Vec<13>::Zero();
   x13.head<2>() = tilt;
@@ -61,9 +90,36 @@ EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
   EstimatorHealth<Mbbr::kWheels> h;
   if (params_.active != Id::kEkf) return h;
   report(isolation_, &h);
+  h.dead = dead_encoders_.dead();
+  h.bias_drift_rad_s = bias_drift_.distance();
+  h.disturbance = ekf_.x().segment<3>(MbbrEkfModel::kDisturbance).norm();
+  h.gyro_left_out = gyro_watch_.left_out();
+  h.gyro_trusted = gyro_watch_.trusted();
   h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
   h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
   return h;
+}
+
+void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
+  MbbrEstimate& x = estimates_[index(Id::kEkf)];
+  Mbbr::Sample believed = z;
+  gyro_watch_.screen(believed, x.omega_B);
+  const double spin_rad_s = Mbbr::vertical_spin_rad_s(x);
+  isolation_.step(ekf_, u, believed, [&](const Vec3& wheel_rates) {
+    return Mbbr::slip_rad_s(wheel_rates, believed.gyro_B_rad_s.z(), kinematics_, spin_rad_s);
+  });
+  // What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
+  bias_drift_.update(ekf_.x().segment<2>(MbbrEkfModel::kBiasX), kMountError_rad * std::abs(x.omega_B.z()));
+  dead_encoders_.update(believed, isolation_.lost());
+  const Vec2 carried = x.theta_dot.z() * Vec2(x.phi_dot_star.y(), -x.phi_dot_star.x());
+  GyroWitness<Mbbr::kWheels> witness;
+  witness.blames_wheel = isolation_.lost() >= 0;
+  witness.wheel_stands = isolation_.stands_still();
+  witness.accel_nis = ekf_.row_nis()[MbbrEkfModel::kAccel] + ekf_.row_nis()[MbbrEkfModel::kAccel + 1];
+  witness.carried_rad_s2 = kinematics_.wheels_from_ball(Vec3(carried.x(), carried.y(), 0.0));
+  witness.rate_rad_s.z() = spin_rad_s;
+  gyro_watch_.compare(believed, witness);
+  x = ekf_.estimate();
 }
 
 const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept {
@@ -71,22 +127,19 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
     start(z);
     return estimates_[index(params_.active)];
   }
+  if (runs(Id::kEkf)) ekf(z, u);
+  if (runs_published()) published(z, u);
+  return estimates_[index(params_.active)];
+}
+
+/// The filters of [T] and the linear one.
+void MbbrEstimators::published(const Mbbr::Sample& z, const Vec3& u) noexcept {
   const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
   Vec<8> y;
   y << z.gyro_B_rad_s, phi_B, z.accel_B_m_s2.head<2>();
   const bool i = z.imu_ok;
   const bool e = z.encoders_ok;
   const std::array<bool, 8> use{i, i, i, e, e, e, i, i};
-
-  if (runs(Id::kEkf)) {
-    const MbbrEstimate& before = estimates_[index(Id::kEkf)];
-    isolation_.step(ekf_, u, z, [&](const Vec3& wheel_rates) {
-      Mbbr::Sample fresh = z;
-      fresh.wheel_rate_rad_s = wheel_rates;
-      return Mbbr::slip_rad_s(fresh, kinematics_, before);
-    });
-    estimates_[index(Id::kEkf)] = ekf_.estimate();
-  }
 
   const auto from_13 = [this](Id id, const Vec<13>& x, double nis) {
     MbbrEstimate& out = estimates_[index(id)];
@@ -128,7 +181,6 @@ const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u,
     out.phi_dot_star = x.tail<2>();
     out.normalized_innovation = kf_.normalized_innovation();
   }
-  return estimates_[index(params_.active)];
 }
 
 }  // namespace equipoise

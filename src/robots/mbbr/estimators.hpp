@@ -7,10 +7,13 @@
 
 #include <array>
 
+#include "equipoise/estimate/dead_encoders.hpp"
+#include "equipoise/estimate/gyro_watch.hpp"
 #include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "equipoise/estimate/slow_drift.hpp"
 #include "equipoise/estimate/wheel_isolation.hpp"
 #include "robots/mbbr/ekf.hpp"
 #include "robots/mbbr/high_yaw.hpp"
@@ -58,17 +61,25 @@ class MbbrEstimators {
   EstimatorHealth<Mbbr::kWheels> health() const noexcept;
   /// It finds a lying encoder by itself.
   bool isolates() const noexcept { return params_.active == Id::kEkf; }
-  bool needs_attitude() const noexcept { return params_.active == Id::kKfAttitude; }
+  bool reads_attitude() const noexcept { return runs(Id::kKfAttitude); }
 
  private:
   static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
   void start(const Mbbr::Sample& z) noexcept;
+  bool runs_published() const noexcept {
+    return runs(Id::kEkf13Published) || runs(Id::kEkf13) || runs(Id::kKfAttitude);
+  }
+  void published(const Mbbr::Sample& z, const Vec3& u) noexcept;
+  void ekf(const Mbbr::Sample& z, const Vec3& u) noexcept;
   void integrate(Id id, double heading_rate) noexcept;
 
   Params params_;
   MbbrKinematics kinematics_;
   MbbrEkf ekf_;
   WheelIsolation<MbbrEkf, Mbbr::kWheels> isolation_;
+  GyroWatch<Mbbr::kWheels> gyro_watch_;
+  DeadEncoders<Mbbr::kWheels> dead_encoders_;
+  SlowDrift<2> bias_drift_;
   KalmanFilter<MbbrPublishedModel> ekf13_published_;
   KalmanFilter<MbbrModel13> ekf13_;
   KalmanFilter<MbbrLinearModel> kf_;

@@ -23,18 +23,23 @@ struct MbbrFirmware {
   static constexpr const char* kSpeedLabel = "ball speed RMSE";
   static constexpr const char* kSpeedUnit = "cm/s";
   static constexpr double kSpeedScale = 100.0;
+  static constexpr bool kDrivesSideways = true;
+  static constexpr double kForward_rad = 0.0;  // heading of a drive forward at yaw 0, from x
 
   static Loaded load(const std::string& path, const Overrides& overrides) {
     return load_mbbr(path, overrides);
   }
-  static Loaded parse(const std::string& text, const std::string& origin) { return parse_mbbr(text, origin); }
+  static Loaded parse(const std::string& text, const std::string& origin,
+                      const std::vector<std::string>& set = {}) {
+    return parse_mbbr(text, origin, set);
+  }
   static std::vector<std::string> estimators() {
     return {kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end()};
   }
   static std::vector<std::string> controllers() { return {"thesis", "scheduled"}; }
   static double rolling_radius_m(const Config& c) { return c.robot.r; }
 
-  /// The configuration with the choices applied, as it flies.
+  /// The configuration with the choices applied, as it runs.
   static Config apply(const Config& configured, const Choice& choice) {
     return with_choice(configured, choice, kMbbrEstimatorNames, MbbrEstimatorId::kEkf13Published,
                        MbbrEstimatorId::kKfAttitude);
@@ -51,7 +56,7 @@ struct MbbrFirmware {
     return f(pipeline);
   }
 
-  /// `config` as it flies; `level` of fidelity.
+  /// `config` as it runs; `level` of fidelity.
   static World world(const Config& config, std::size_t level, std::uint64_t seed) {
     MbbrWorldParams params = config.world[level];
     params.common.seed = seed;

@@ -1,6 +1,6 @@
 #include "robots/mbbr/high_yaw.hpp"
 
-#include "equipoise/estimate/midpoint.hpp"
+#include "equipoise/estimate/heun.hpp"
 #include "robots/mbbr/published.hpp"
 
 namespace equipoise {
@@ -108,6 +108,20 @@ Mat<3, 7> slip_jacobian(const MbbrHighYaw::State& x) noexcept {
 
 }  // namespace
 
+/// Flattened: the Jacobian is not asked for and falls away.
+[[gnu::flatten]] MbbrObservable::State MbbrObservable::rate(const MbbrCoefficients& c, const State& x,
+                                                            const Vec3& u) noexcept {
+  const MbbrHighYaw::State d = dynamic(x);
+  Vec<5> a;
+  double unused[5][7];
+  generated::mbbr::accelerations(c, d.data(), u.data(), a.data(), unused);
+  a(3) += x(kThetaDotZ) * x(kPhiDotY);
+  a(4) -= x(kThetaDotZ) * x(kPhiDotX);
+  State x_dot;
+  x_dot << x.segment<2>(kThetaDotX), encoder_sums_rate(d), a;
+  return x_dot;
+}
+
 void MbbrObservable::derivative(const MbbrCoefficients& c, const State& x, const Vec3& u, State& x_dot,
                                 Mat<10, 10>& A) noexcept {
   const MbbrHighYaw::State d = dynamic(x);
@@ -155,7 +169,7 @@ void MbbrModel13::predict(const Vec<13>& x, const Vec3& u, Vec<13>& x_next, Mat<
     A.block<3, 2>(M::kSlipX, 0) = E.leftCols<2>();
     A.block<3, 5>(M::kSlipX, M::kThetaDotX) = E.rightCols<5>();
   };
-  midpoint<13>(derivative, x, kTickS, x_next, F);
+  heun<13>(derivative, x, kTickS, x_next, F);
 }
 
 Mat<13, 3> MbbrModel13::input_matrix() const noexcept {

@@ -36,9 +36,12 @@ struct MbbrObservable {
 
   static MbbrHighYaw::State dynamic(const State& x) noexcept {
     MbbrHighYaw::State d;
-    d << x.head<2>(), x.tail<5>();
+    d.head<2>() = x.head<2>();
+    d.tail<5>() = x.tail<5>();
     return d;
   }
+  /// dx/dt.
+  static State rate(const MbbrCoefficients& c, const State& x, const Vec3& u) noexcept;
   /// dx/dt and its Jacobian.
   static void derivative(const MbbrCoefficients& c, const State& x, const Vec3& u, State& x_dot,
                          Mat<10, 10>& A) noexcept;

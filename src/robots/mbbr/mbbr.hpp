@@ -3,6 +3,7 @@
 // RT-safe after construction.
 #pragma once
 
+#include "equipoise/control/allocate.hpp"
 #include "equipoise/samples.hpp"
 #include "equipoise/types.hpp"
 #include "robots/mbbr/omniwheels.hpp"
@@ -52,6 +53,13 @@ class MbbrKinematics {
     return (1.0 / ratio_) * (T_ob_.transpose() * axes_B);
   }
 
+  /// Wheels within +-limit: balance, in the plane, before yaw.
+  Vec3 allocate(const Vec3& axes_B, double limit) const noexcept {
+    const Vec3 plane = wheels_from_axes(Vec3(axes_B.x(), axes_B.y(), 0.0));
+    const Vec3 yaw = wheels_from_axes(Vec3(0.0, 0.0, axes_B.z()));
+    return within(plane, yaw, limit);
+  }
+
   const Mat3& T_ob() const noexcept { return T_ob_; }
 
  private:
@@ -90,12 +98,20 @@ struct Mbbr {
   using Estimate = MbbrEstimate;
   using Sample = Measurement<kWheels>;
 
+  /// (R^T omega)_z of a ball that does not spin about the vertical.
+  static double vertical_spin_rad_s(const MbbrEstimate& x) noexcept {
+    return x.phi_dot_star.x() * std::sin(x.theta_xy.y()) * std::cos(x.theta_xy.x()) -
+           x.phi_dot_star.y() * std::sin(x.theta_xy.x());
+  }
+
   /// The ball does not spin about the vertical: (R^T omega)_z - Omega_z must be what the encoders say.
   static double slip_rad_s(const Sample& z, const MbbrKinematics& kinematics,
                            const MbbrEstimate& x) noexcept {
-    const double vertical = x.phi_dot_star.x() * std::sin(x.theta_xy.y()) * std::cos(x.theta_xy.x()) -
-                            x.phi_dot_star.y() * std::sin(x.theta_xy.x());
-    return kinematics.ball_from_wheels(z.wheel_rate_rad_s).z() - (vertical - z.gyro_B_rad_s.z());
+    return slip_rad_s(z.wheel_rate_rad_s, z.gyro_B_rad_s.z(), kinematics, vertical_spin_rad_s(x));
+  }
+  static double slip_rad_s(const Vec3& wheel_rates, double gyro_z_rad_s, const MbbrKinematics& kinematics,
+                           double vertical_spin_rad_s) noexcept {
+    return kinematics.ball_from_wheels(wheel_rates).z() - (vertical_spin_rad_s - gyro_z_rad_s);
   }
 };
 

@@ -3,16 +3,6 @@
 #include <algorithm>
 
 namespace equipoise {
-namespace {
-
-Vec2 slew(const Vec2& from, const Vec2& to, double step) noexcept {
-  const Vec2 change = to - from;
-  const double length = change.norm();
-  return length > step ? Vec2(from + change * (step / length)) : to;
-}
-
-}  // namespace
-
 StateView view(const MbbrReference& ref, const MbbrParameters& p) noexcept {
   StateView v;
   v.theta_rad << ref.theta_xy, ref.theta_z;
@@ -24,8 +14,8 @@ StateView view(const MbbrReference& ref, const MbbrParameters& p) noexcept {
 }
 
 void MbbrReferenceStage::reset(const MbbrEstimate& x_hat) noexcept {
-  heading_zero_ = x_hat.theta_z;
-  velocity_W_.setZero();
+  heading_zero_ = Turn(x_hat.theta_z);
+  drive_W_.reset();
   yaw_rate_ = 0.0;
   phi_ref_ = x_hat.phi;
   theta_z_ref_ = x_hat.theta_z;
@@ -35,47 +25,51 @@ void MbbrReferenceStage::reset(const MbbrEstimate& x_hat) noexcept {
 }
 
 MbbrReference MbbrReferenceStage::update(const Command& command, const MbbrEstimate& x_hat) noexcept {
-  if (command.heading_reset) heading_zero_ = x_hat.theta_z;
+  if (command.heading_reset) heading_zero_ = Turn(x_hat.theta_z);
 
   // (6.11)
-  const Vec2 velocity_target = rotate(heading_zero_, command.velocity_W_m_s);
-  const Vec2 velocity_before = velocity_W_;
-  velocity_W_ = slew(velocity_W_, velocity_target, p_.max_acceleration_m_s2 * kTickS);
-  const double yaw_step = p_.max_yaw_acceleration_rad_s2 * kTickS;
-  yaw_rate_ += std::clamp(command.yaw_rate_rad_s - yaw_rate_, -yaw_step, yaw_step);
-  const Vec2 phi_dot_ref = ball_rate(p_.ball_radius_m, velocity_W_);
+  const double yaw_step = p_.yaw_acceleration_rad_s2() * kTickS;
+  const double yaw_target = p_.budget.allowed_yaw_rate(command.yaw_rate_rad_s);
+  yaw_rate_ += std::clamp(yaw_target - yaw_rate_, -yaw_step, yaw_step);
+  // Room for the travel beside the turn that is there and the one that is wanted.
+  const double room = p_.budget.allowed_speed(std::max(std::abs(yaw_rate_), std::abs(yaw_target)));
+  const double asked = command.velocity_W_m_s.norm();
+  const Vec2 feasible = asked > room ? Vec2(command.velocity_W_m_s * (room / asked)) : command.velocity_W_m_s;
+  drive_W_.update(heading_zero_(feasible),
+                  {std::min(p_.max_acceleration_m_s2, p_.feasible_acceleration_m_s2), p_.max_jerk_m_s3});
+  const Vec2 phi_dot_ref = ball_rate(p_.ball_radius_m, drive_W_.velocity());
   phi_ref_ += phi_dot_ref * kTickS;
   theta_z_ref_ += yaw_rate_ * kTickS;
 
   const auto row = p_.schedule(std::abs(yaw_rate_));
-  const double to_yaw = -x_hat.theta_z;
+  const Turn heading(x_hat.theta_z);
   const bool inertial = p_.frame == FilterFrame::kInertial;
 
   MbbrReference ref;
   ref.phi = phi_ref_;
   ref.theta_z = theta_z_ref_;
   ref.yaw_rate = yaw_rate_;
-  ref.d_phi = rotate(to_yaw, phi_ref_ - x_hat.phi);  // (6.8)
-  ref.phi_dot_star = rotate(to_yaw, phi_dot_ref);
-  ref.phi_ddot_star = rotate(to_yaw, ball_rate(p_.ball_radius_m, velocity_W_ - velocity_before) / kTickS);
+  ref.d_phi = heading.back(phi_ref_ - x_hat.phi);  // (6.8)
+  ref.phi_dot_star = heading.back(phi_dot_ref);
+  ref.phi_ddot_star = heading.back(ball_rate(p_.ball_radius_m, drive_W_.acceleration()));
+  ref.phi_dddot_star = heading.back(ball_rate(p_.ball_radius_m, drive_W_.jerk()));
   ref.d_phi_dot_unfiltered = ref.phi_dot_star - x_hat.phi_dot_star;  // (6.9)
-  const Vec2 rate_error =
-      inertial ? rotate(x_hat.theta_z, ref.d_phi_dot_unfiltered) : ref.d_phi_dot_unfiltered;
+  const Vec2 rate_error = inertial ? heading(ref.d_phi_dot_unfiltered) : ref.d_phi_dot_unfiltered;
 
   // First-order low-pass, exact for a held input.
   const double blend = 1.0 - std::exp(-row[MbbrReferenceParams::kLowPassRadS] * kTickS);
   low_pass_ += blend * (rate_error - low_pass_);
-  ref.d_phi_dot = inertial ? rotate(to_yaw, low_pass_) : low_pass_;
+  ref.d_phi_dot = inertial ? heading.back(low_pass_) : low_pass_;
 
   // (6.13): the lean of this tick follows from the errors up to the last one.
-  ref.theta_xy = inertial ? rotate(to_yaw, lean_) : lean_;
+  ref.theta_xy = inertial ? heading.back(lean_) : lean_;
   // (6.12). In the inertial frame the change of the lean is, resolved in the yaw frame, the body rate it asks
   // for.
   const bool body = p_.rate_feedback == RateFeedback::kBody;
-  const Vec2 lean_now = body ? rotate(x_hat.theta_z, ref.theta_xy) : ref.theta_xy;
+  const Vec2 lean_now = body ? heading(ref.theta_xy) : ref.theta_xy;
   const Vec2 lean_rate = (lean_now - lean_previous_) / kTickS;
   lean_previous_ = lean_now;
-  ref.rate_xy = body ? rotate(to_yaw, lean_rate) : lean_rate;
+  ref.rate_xy = body ? heading.back(lean_rate) : lean_rate;
   lean_ = row[MbbrReferenceParams::kSlcPole] * lean_ +
           p_.slc_sign * row[MbbrReferenceParams::kSlcGain] * p_.slc_unit * rate_error;
 

@@ -6,7 +6,11 @@
 // RT-safe.
 #pragma once
 
+#include <algorithm>
+#include <limits>
+
 #include "equipoise/control/gain_schedule.hpp"
+#include "equipoise/control/governor.hpp"
 #include "robots/mbbr/mbbr.hpp"
 
 namespace equipoise {
@@ -23,16 +27,26 @@ struct MbbrReferenceParams {
   RateFeedback rate_feedback = RateFeedback::kBody;
   FilterFrame frame = FilterFrame::kInertial;
   double max_acceleration_m_s2 = 0.5;  // of the velocity command
+  double max_jerk_m_s3 = std::numeric_limits<double>::infinity();
   double max_yaw_acceleration_rad_s2 = 2.0 * kPi;
+  double floor_yaw_acceleration_rad_s2 =
+      std::numeric_limits<double>::infinity();                                  // that does not spin the ball
+  double feasible_acceleration_m_s2 = std::numeric_limits<double>::infinity();  // of this robot
+  DutyBudget budget;
   double ball_radius_m = 0.032;
+
+  double yaw_acceleration_rad_s2() const noexcept {
+    return std::min(max_yaw_acceleration_rad_s2, floor_yaw_acceleration_rad_s2);
+  }
 };
 
 struct MbbrReference {
-  Vec2 theta_xy = Vec2::Zero();       // lean, yaw frame
-  Vec2 rate_xy = Vec2::Zero();        // its rate: body rates or Euler rates, as configured
-  Vec2 phi = Vec2::Zero();            // inertial
-  Vec2 phi_ddot_star = Vec2::Zero();  // inertial acceleration, resolved in the yaw frame
-  Vec2 phi_dot_star = Vec2::Zero();   // yaw frame
+  Vec2 theta_xy = Vec2::Zero();        // lean, yaw frame
+  Vec2 rate_xy = Vec2::Zero();         // its rate: body rates or Euler rates, as configured
+  Vec2 phi = Vec2::Zero();             // inertial
+  Vec2 phi_ddot_star = Vec2::Zero();   // inertial acceleration, resolved in the yaw frame
+  Vec2 phi_dddot_star = Vec2::Zero();  // its inertial rate, resolved alike
+  Vec2 phi_dot_star = Vec2::Zero();    // yaw frame
   double theta_z = 0.0;
   double yaw_rate = 0.0;
   // Errors, reference minus estimate, yaw frame, [T] (6.6)-(6.9)
@@ -61,8 +75,8 @@ class MbbrReferenceStage {
 
  private:
   MbbrReferenceParams p_;
-  double heading_zero_ = 0.0;  // heading at the last heading reset
-  Vec2 velocity_W_ = Vec2::Zero();
+  Turn heading_zero_{0.0};  // heading at the last heading reset
+  SmoothVelocity<2> drive_W_;
   double yaw_rate_ = 0.0;
   Vec2 phi_ref_ = Vec2::Zero();
   double theta_z_ref_ = 0.0;

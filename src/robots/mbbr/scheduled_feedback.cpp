@@ -21,10 +21,10 @@ Vec3 MbbrScheduledFeedback::update(const MbbrReference& ref) noexcept {
   const Vec2 theta = ref.theta_xy - ref.d_theta;
   const Vec2 body_rate = ref.rate_xy - ref.d_rate;
 
-  const Vec2 feedback = gain(MbbrGains::kTheta, theta - g.lean * ref.phi_ddot_star) -
-                        gain(MbbrGains::kPhi, ref.d_phi) + gain(MbbrGains::kBodyRate, body_rate) -
-                        gain(MbbrGains::kPhiDot, ref.d_phi_dot_unfiltered) +
-                        gain(MbbrGains::kUBefore, d_u_before_);
+  const Vec2 feedback =
+      gain(MbbrGains::kTheta, theta - g.lean * ref.phi_ddot_star) - gain(MbbrGains::kPhi, ref.d_phi) +
+      gain(MbbrGains::kBodyRate, body_rate - g.lean * ref.phi_dddot_star) -
+      gain(MbbrGains::kPhiDot, ref.d_phi_dot_unfiltered) + gain(MbbrGains::kUBefore, d_u_before_);
   const Vec2 feedforward =
       times(g.speed, -g.speed_turn * ref.yaw_rate, ref.phi_dot_star) + g.drive * ref.phi_ddot_star;
   d_u_before_ = feedback.allFinite() ? feedback : Vec2(Vec2::Zero());  // one NaN is not for ever

@@ -17,6 +17,7 @@ struct MbbrScheduledFeedbackParams {
 
 class MbbrScheduledFeedback {
  public:
+  static constexpr bool kSharesDuty = true;
   using Params = MbbrScheduledFeedbackParams;
   explicit MbbrScheduledFeedback(const Params& params) : p_(params) {}
 

@@ -15,6 +15,7 @@ struct MbbrThesisFeedbackParams {
 
 class MbbrThesisFeedback {
  public:
+  static constexpr bool kSharesDuty = false;  // each wheel for itself, as in [T]
   using Params = MbbrThesisFeedbackParams;
   explicit MbbrThesisFeedback(const Params& params) : p_(params) {}
 

@@ -48,12 +48,25 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
       s_(start_state(start_noise_, world.common.initial_tilt_rad)),
+      here_(at(s_)),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)) {}
 
 MbbrMotion MbbrWorld::motion(const State& s) noexcept {
   MbbrMotion m(s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot));
   m.spin_rad_s = s(kSpin);
   return m;
+}
+
+MbbrWorld::Instant MbbrWorld::at(const State& s) noexcept {
+  Instant now;
+  now.motion = motion(s);
+  now.heading = Turn(s(kTheta + 2));
+  return now;
+}
+
+void MbbrWorld::arrive(const State& s) noexcept {
+  s_ = s;
+  here_ = at(s_);
 }
 
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept {
@@ -64,37 +77,36 @@ Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& r
 }
 
 /// On a slope the whole weight pulls the ball downhill; rolling resistance holds it back. Yaw frame, N.
-Vec2 MbbrWorld::pull_star(const State& s) const noexcept {
+Vec2 MbbrWorld::pull_star(const Instant& now) const noexcept {
   Vec2 pull = Vec2::Zero();
   const double weight_N = (robot_.m_t + robot_.m_b) * kGravity_m_s2;
   const Vec2& slope = world_.common.floor_slope_rad;
-  if (!slope.isZero(0.0)) pull = rotate(-s(kTheta + 2), Vec2(-weight_N * slope));
+  if (!slope.isZero(0.0)) pull = now.heading.back(-weight_N * slope);
   if (world_.common.rolling_resistance != 0.0) {
-    const Vec2 v = ball_velocity(robot_.r, s.segment<2>(kPhiDot));
+    const Vec2 v = ball_velocity(robot_.r, now.motion.phi_dot_star);
     pull -= world_.common.rolling_resistance * weight_N * v / std::max(v.norm(), kRollingStart_m_s);
   }
   return pull;
 }
 
-MbbrWorld::Instant MbbrWorld::forces(const State& s, const Vec2& push_W,
+MbbrWorld::Instant MbbrWorld::forces(const Instant& at, const Vec2& push_W,
                                      const Vec3& friction_B) const noexcept {
-  Instant now;
-  now.motion = motion(s);
+  Instant now = at;
   const Vec3 relative = MbbrDynamics::encoder_rate_B(now.motion);
   const double viscous = world_.common.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
   now.viscous_B = -viscous * relative;
   now.wheel_torque = drive_.wheel_torques(motors_, relative);
   now.loads.tau_B = drive_.torque_B(now.wheel_torque, now.viscous_B + friction_B);
   if (!push_W.isZero(0.0)) {
-    now.loads.push_B = now.motion.R().topRows<2>().transpose() * rotate(-s(kTheta + 2), push_W);
+    now.loads.push_B = now.motion.R().topRows<2>().transpose() * now.heading.back(push_W);
   }
-  now.loads.pull_star = pull_star(s);
+  now.loads.pull_star = pull_star(now);
   return now;
 }
 
-MbbrWorld::Instant MbbrWorld::rolling(const State& s, const Vec2& push_W,
+MbbrWorld::Instant MbbrWorld::rolling(const Instant& at, const Vec2& push_W,
                                       const Vec3& friction_B) const noexcept {
-  Instant now = forces(s, push_W, friction_B);
+  Instant now = forces(at, push_W, friction_B);
   now.mass = dynamics_.mass(now.motion);
   now.a = dynamics_.accelerations(now.motion, now.mass, now.loads);
   return now;
@@ -111,20 +123,21 @@ MbbrWorld::Instant MbbrWorld::with_friction(const Instant& free, const Vec3& fri
   return now;
 }
 
-MbbrWorld::State MbbrWorld::derivative(const State& s, const Instant& now) const noexcept {
+MbbrWorld::State MbbrWorld::derivative(const Instant& now) const noexcept {
   const MbbrMotion& m = now.motion;
   State d;
   d.segment<3>(kTheta) = m.theta_dot();
   d.segment<3>(kOmega) = now.a.omega_dot_B;
   d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, now.a);
-  d.segment<2>(kPhi) = rotate(s(kTheta + 2), m.phi_dot_star);
+  d.segment<2>(kPhi) = now.heading(m.phi_dot_star);
   d.segment<3>(kRelative) = drive_.seen_rate_B(MbbrDynamics::encoder_rate_B(m));
   d.segment<3>(kSlip).setZero();
   return d;
 }
 
-MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const MbbrMotion& m,
+MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const Instant& now,
                                             const MbbrSlipAccelerations& a) const noexcept {
+  const MbbrMotion& m = now.motion;
   const Vec3 theta_dot = m.theta_dot();
   const auto turning = [&](const Vec2& v) { return Vec2(theta_dot.z() * Vec2(v.y(), -v.x())); };
   const Vec2 slip = s.segment<2>(kSlip);
@@ -133,7 +146,7 @@ MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const MbbrMotion& m,
   d.segment<3>(kTheta) = theta_dot;
   d.segment<3>(kOmega) = a.omega_dot_B;
   d.segment<2>(kPhiDot) = a.ball_dot.head<2>() + turning(m.phi_dot_star);
-  d.segment<2>(kPhi) = rotate(s(kTheta + 2), m.phi_dot_star + Vec2(-slip.y(), slip.x()) / robot_.r);
+  d.segment<2>(kPhi) = now.heading(m.phi_dot_star + Vec2(-slip.y(), slip.x()) / robot_.r);
   d.segment<3>(kRelative) = drive_.seen_rate_B(MbbrDynamics::encoder_rate_B(m));
   d.segment<2>(kSlip) = slip_dot + turning(slip);
   d(kSpin) = a.ball_dot.z();
@@ -150,7 +163,7 @@ Vec3 MbbrWorld::friction_limit_B(const MbbrMotion& m) const noexcept {
 Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Instant& free) const noexcept {
   if (!world_.common.friction) return Vec3::Zero();
   const double h = world_.common.step_s;
-  const State next = s + h * derivative(s, free);
+  const State next = s + h * derivative(free);
   return uncoupled_coulomb_torque<3>(MbbrDynamics::encoder_rate_B(motion(next)), mobility_, h,
                                      friction_limit_B(free.motion));
 }
@@ -159,7 +172,7 @@ Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Instant& free) const noex
 MbbrFriction MbbrWorld::slip_friction(const State& s, const Instant& free, double h) const noexcept {
   const auto mass = floor_.mass(free.motion);
   const MbbrSlipAccelerations a = floor_.accelerations(free.motion, mass, free.loads, {});
-  const State next = s + h * slip_derivative(s, free.motion, a);
+  const State next = s + h * slip_derivative(s, free, a);
   Vec<6> rates;
   rates << MbbrDynamics::encoder_rate_B(motion(next)), next.segment<3>(kSlip);
   const double normal = floor_.needed(free.motion, free.loads, felt_as_rolling(a, robot_.r)).normal_N;
@@ -180,15 +193,16 @@ void MbbrWorld::disturb() {
   if (world_.process_noise_sigma.isZero(0.0)) return;
   Vec<10> v;
   for (int i = 0; i < 10; ++i) v(i) = process_noise_.gaussian(world_.process_noise_sigma(i));
-  const MbbrMotion before = motion(s_);
-  Vec3 theta_dot = before.theta_dot();
-  s_.segment<3>(kTheta) += v.head<3>();
+  Vec3 theta_dot = here_.motion.theta_dot();
+  State s = s_;
+  s.segment<3>(kTheta) += v.head<3>();
   theta_dot += v.segment<3>(5);
-  s_.segment<3>(kOmega) = body_rates(s_.segment<2>(kTheta), theta_dot);
-  s_.segment<2>(kPhiDot) += v.tail<2>();
-  s_.segment<2>(kPhi) += rotate(s_(kTheta + 2), Vec2(v(3), v(4)));
-  s_.segment<2>(kRelative) += Vec2(v(3) - v(0), v(4) - v(1));
-  s_(kRelative + 2) -= v(2);
+  s.segment<3>(kOmega) = body_rates(s.segment<2>(kTheta), theta_dot);
+  s.segment<2>(kPhiDot) += v.tail<2>();
+  s.segment<2>(kPhi) += rotate(s(kTheta + 2), Vec2(v(3), v(4)));
+  s.segment<2>(kRelative) += Vec2(v(3) - v(0), v(4) - v(1));
+  s(kRelative + 2) -= v(2);
+  arrive(s);
 }
 
 void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a,
@@ -201,10 +215,10 @@ void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const Mb
 }
 
 void MbbrWorld::step(double h) noexcept {
-  drive_.begin_step(motors_, MbbrDynamics::encoder_rate_B(motion(s_)),
+  drive_.begin_step(motors_, MbbrDynamics::encoder_rate_B(here_.motion),
                     kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
   const Vec2 push = push_now();
-  const Instant free = rolling(s_, push, Vec3::Zero());
+  const Instant free = rolling(here_, push, Vec3::Zero());
   if (!slipping_) {
     friction_.axes_B = coulomb_torque_B(s_, free);
     const Instant now = with_friction(free, friction_.axes_B);
@@ -212,27 +226,30 @@ void MbbrWorld::step(double h) noexcept {
     if (!slipping_) {
       if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
       load_wheels(now, friction_.axes_B, now.a, h);
-      s_ = rk4_step(s_, derivative(s_, now), h,
-                    [&](const State& s) { return derivative(s, rolling(s, push, friction_.axes_B)); });
+      arrive(rk4_step(s_, derivative(now), h,
+                      [&](const State& s) { return derivative(rolling(at(s), push, friction_.axes_B)); }));
       time_s_ += h;
       return;
     }
   }
   friction_ = slip_friction(s_, free, h);
-  const auto sliding = [&](const State& s) {
-    const Instant at = forces(s, push, friction_.axes_B);
-    return floor_.accelerations(at.motion, floor_.mass(at.motion), at.loads, friction_.floor);
+  const auto sliding = [&](const Instant& at) {
+    const Instant now = forces(at, push, friction_.axes_B);
+    return floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
   };
-  const MbbrSlipAccelerations a = sliding(s_);
+  const MbbrSlipAccelerations a = sliding(here_);
   const MbbrAccelerations felt_a = felt_as_rolling(a, robot_.r);
   if (sensors_.aged()) sensors_.feel(felt(free.motion, felt_a));
   load_wheels(free, friction_.axes_B, felt_a, h);
-  s_ = rk4_step(s_, slip_derivative(s_, free.motion, a), h,
-                [&](const State& s) { return slip_derivative(s, motion(s), sliding(s)); });
+  State next = rk4_step(s_, slip_derivative(s_, free, a), h, [&](const State& s) {
+    const Instant now = at(s);
+    return slip_derivative(s, now, sliding(now));
+  });
   if (friction_.floor_holds) {
-    s_.segment<3>(kSlip).setZero();
+    next.segment<3>(kSlip).setZero();
     slipping_ = false;
   }
+  arrive(next);
   time_s_ += h;
 }
 
@@ -257,17 +274,17 @@ void MbbrWorld::advance(const MotorCommand& command) {
   } else {
     disturb();
   }
-  motors_.update_battery(kinematics_.wheels_from_ball(MbbrDynamics::encoder_rate_B(motion(s_))));
+  motors_.update_battery(kinematics_.wheels_from_ball(MbbrDynamics::encoder_rate_B(here_.motion)));
 }
 
 Felt MbbrWorld::felt_now() const noexcept {
   if (slipping_) {
-    const Instant now = forces(s_, push_now(), friction_.axes_B);
+    const Instant now = forces(here_, push_now(), friction_.axes_B);
     const MbbrSlipAccelerations a =
         floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
     return felt(now.motion, felt_as_rolling(a, robot_.r));
   }
-  Instant now = rolling(s_, push_now(), Vec3::Zero());
+  Instant now = rolling(here_, push_now(), Vec3::Zero());
   if (!held_) now = with_friction(now, coulomb_torque_B(s_, now));
   return felt(now.motion, now.a);
 }

@@ -53,6 +53,7 @@ class MbbrWorld {
   /// The forces of one instant and what they do.
   struct Instant {
     MbbrMotion motion;
+    Turn heading{0.0};
     Vec3 wheel_torque;
     Vec3 viscous_B;
     MbbrLoads loads;
@@ -60,21 +61,24 @@ class MbbrWorld {
     MbbrAccelerations a;
   };
   static MbbrMotion motion(const State& s) noexcept;
-  Instant forces(const State& s, const Vec2& push_W, const Vec3& friction_B) const noexcept;
-  Instant rolling(const State& s, const Vec2& push_W, const Vec3& friction_B) const noexcept;
+  static Instant at(const State& s) noexcept;  // motion alone
+  /// Of an instant whose motion is known.
+  Instant forces(const Instant& at, const Vec2& push_W, const Vec3& friction_B) const noexcept;
+  Instant rolling(const Instant& at, const Vec2& push_W, const Vec3& friction_B) const noexcept;
   Instant with_friction(const Instant& free, const Vec3& friction_B) const noexcept;
-  State derivative(const State& s, const Instant& now) const noexcept;
-  State slip_derivative(const State& s, const MbbrMotion& m, const MbbrSlipAccelerations& a) const noexcept;
+  State derivative(const Instant& now) const noexcept;
+  State slip_derivative(const State& s, const Instant& now, const MbbrSlipAccelerations& a) const noexcept;
   Vec3 friction_limit_B(const MbbrMotion& m) const noexcept;
   Vec3 coulomb_torque_B(const State& s, const Instant& free) const noexcept;
   MbbrFriction slip_friction(const State& s, const Instant& free, double h) const noexcept;
-  Vec2 pull_star(const State& s) const noexcept;
+  Vec2 pull_star(const Instant& now) const noexcept;
   Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
   Felt felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
   Felt felt_now() const noexcept;
   void step(double h) noexcept;
   void load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a, double h) noexcept;
   void disturb();
+  void arrive(const State& s) noexcept;
 
   MbbrParameters robot_;
   MbbrWorldParams world_;
@@ -86,6 +90,7 @@ class MbbrWorld {
   MbbrSlipping floor_;
   NoiseStream start_noise_, process_noise_;
   State s_;
+  Instant here_;  // motion at s_
   SimulatedSensors sensors_;
   double time_s_ = 0.0;
   bool held_ = true;

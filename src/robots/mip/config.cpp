@@ -64,12 +64,17 @@ MipEstimatorParams read_estimators(Section s, const MipParameters& robot) {
   return p;
 }
 
-MipReferenceParams read_reference(Section s, double wheel_radius_m) {
+MipReferenceParams read_reference(Section s, const MipParameters& robot, double friction_share) {
   MipReferenceParams p;
   p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
+  p.max_jerk_m_s3 = s.number("max_jerk_m_s3", 0.01, 1e9);
   p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
+  const MipWheelBudget wheel{s.number("duty_share", 0.05, 1.0),
+                             s.number("max_wheel_rate_rad_s", 0.1, 1000.0)};
   p.max_phi_error_rad = s.number("max_phi_error_rad", 0.01, 1000.0);
-  p.wheel_radius_m = wheel_radius_m;
+  p.wheel_radius_m = robot.r;
+  p.feasible_acceleration_m_s2 = feasible_acceleration_m_s2(robot);
+  p.budget = mip_duty_budget(robot, wheel, friction_share);
   s.finish();
   return p;
 }
@@ -147,7 +152,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
   c.friction.gain = friction.number("compensation", 0.0, 1.5);
   friction.finish();
   c.estimators = read_estimators(root.table("estimator"), c.robot);
-  c.reference = read_reference(root.table("reference"), c.robot.r);
+  c.reference = read_reference(root.table("reference"), c.robot, c.friction.gain);
 
   Section controller = root.table("controller");
   Section slc = controller.table("slc");
@@ -160,6 +165,9 @@ Loaded<MipConfig> read_mip(const Document& document) {
   c.design.lqr = read_lqr_design(lqr.table("design"), &c.design.input_delay_s);
   lqr.finish();
   c.design.yaw = read_yaw_design(controller.table("yaw"));
+  if (const auto problem = design_problem(c.robot, c.design, c.motor.k1()))
+    (problem->parameter.empty() ? lqr.fail("design", problem->why)
+                                : robot.fail(problem->parameter, problem->why));
   c.slc.gains = c.lqr.gains = design_mip(c.robot, c.design);
   controller.finish();
   c.safety = config::read_safety(root.table("safety"));
@@ -175,6 +183,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
   world.finish();
   if (root.has("population")) root.table("population");  // read when a robot is drawn
   root.finish();
+  loaded.keys = document.keys();
   loaded.sha256 = document.sha256();
   loaded.toml = document.canonical();
   return loaded;
@@ -186,8 +195,9 @@ Loaded<MipConfig> load_mip(const std::string& path, const Overrides& overrides) 
   return read_mip(Document(path, overrides));
 }
 
-Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin) {
-  return read_mip(Document::parse(text, origin));
+Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin,
+                            const std::vector<std::string>& set) {
+  return read_mip(Document::parse(text, origin, set));
 }
 
 MipSlcPipeline::Params MipConfig::slc_pipeline() const {

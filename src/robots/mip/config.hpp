@@ -42,7 +42,8 @@ struct MipConfig {
 };
 
 Loaded<MipConfig> load_mip(const std::string& path, const Overrides& overrides);
-/// From text, e.g. of a log; `origin` names it in errors.
-Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin);
+/// From text, e.g. of a log; `origin` names it in errors. `set`: as of --set.
+Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin,
+                            const std::vector<std::string>& set = {});
 
 }  // namespace equipoise

@@ -1,6 +1,6 @@
 #include "robots/mip/design.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "robots/mip/models.hpp"
@@ -9,6 +9,12 @@ namespace equipoise {
 namespace {
 
 double weight(double deviation) { return 1.0 / (deviation * deviation); }
+
+/// The u that holds a radian of lean, and the wheels' acceleration under it.
+double hold_per_lean(const MipLinear& s) { return std::abs(s.A(2, 0) / s.b(2, 0)); }
+double wheel_per_lean(const MipLinear& s) {
+  return std::abs(s.A(3, 0).real() + s.b(3, 0).real() * hold_per_lean(s));
+}
 
 /// Second order in s, ascending powers.
 struct Polynomial {
@@ -52,20 +58,51 @@ MipLinear mip_yaw_linear(const MipParameters& p) {
   return s;
 }
 
+std::optional<DesignProblem> design_problem(const MipParameters& p, const MipDesignParams& d,
+                                            double wheel_torque_N_m) {
+  const double gyration_m = std::sqrt(p.I_b1 / p.m_b);  // Table 3.2: 0.88
+  if (auto bad =
+          outside("com_height_m", "height over the body's radius of gyration", p.l / gyration_m, 0.1, 4.0))
+    return bad;
+  if (auto bad =
+          outside("k1_N_m", "over the torque of a motor of [motor]", p.k1 / wheel_torque_N_m, 0.3, 3.0))
+    return bad;
+  const MipLinear s = mip_linear(p, 0.0);
+  if (auto bad = beyond_recovery(s.A, s.b, 0)) return bad;
+  const MipGains g = design_mip(p, d);
+  CMatrix K(1, 5);
+  K << g.lqr.theta, g.lqr.phi, g.lqr.theta_dot, g.lqr.phi_dot, -g.lqr.u_before;
+  return without_margin(sampled(s.A, s.b, kTickS, d.input_delay_s), K);
+}
+
+double feasible_acceleration_m_s2(const MipParameters& p) {
+  const MipLinear s = mip_linear(p, 0.0);
+  return recoverable(s.A, s.b, 0).limit / 3.0 * wheel_per_lean(s) * p.r;
+}
+
+DutyBudget mip_duty_budget(const MipParameters& p, const MipWheelBudget& wheel, double friction_share) {
+  const double against_back_emf = (p.k2 + p.mu_v) / p.k1;
+  DutyBudget b;
+  b.of_friction = friction_share * p.mu_c / p.k1;
+  b.share = std::min(wheel.duty_share, b.of_friction + against_back_emf * wheel.max_rate_rad_s);
+  b.per_yaw_rate = p.yaw_to_wheel() * against_back_emf;
+  b.per_speed = against_back_emf / p.r;
+  return b;
+}
+
 MipSlcGains design_mip_slc(const MipParameters& p, const MipSlcDesign& d) {
   const MipLinear s = mip_linear(p, 0.0);
   const Eigen::Matrix4d A = s.A.real();
-  Eigen::Matrix3d tilt_and_rates;  // without phi, which is an integrator
+  CMatrix tilt_and_rates(3, 3);  // without phi, which is an integrator
   tilt_and_rates << 0.0, 1.0, 0.0, A(2, 0), 0.0, A(2, 3), A(3, 0), 0.0, A(3, 3);
-  const Vec3 poles = Eigen::EigenSolver<Eigen::Matrix3d>(tilt_and_rates, false).eigenvalues().real();
+  const Eigen::VectorXd poles = eigenvalues(tilt_and_rates).real();
   const double unstable = poles.maxCoeff();
   const double fastest = -poles.minCoeff();
-  const double hold = std::abs(A(2, 0) / s.b(2, 0).real());
-  const double wheel_per_lean = std::abs(A(3, 0) + s.b(3, 0).real() * hold);
+  const double hold = hold_per_lean(s);
 
   const double integral = d.integral_p * unstable;
   const double lead = d.lead_q * fastest;
-  const double outer_gain = d.outer_gain_pp_a * unstable * unstable / wheel_per_lean;
+  const double outer_gain = d.outer_gain_pp_a * unstable * unstable / wheel_per_lean(s);
   const double zero = d.outer_zero_p * unstable;
   const double pole = d.outer_pole_p * unstable;
   const double gain = -d.gain_U * hold;

@@ -3,6 +3,8 @@
 // In: parameters, weights -> out: gains. Source: [T] Fig. 3.3, (3.52); docs/derivation.md. Start-up only.
 #pragma once
 
+#include "equipoise/control/governor.hpp"
+#include "equipoise/control/plausible.hpp"
 #include "equipoise/control/riccati.hpp"
 #include "robots/mip/mip.hpp"
 
@@ -93,6 +95,23 @@ MipLinear mip_yaw_linear(const MipParameters& p);
 inline constexpr double kMipPublishedHz = 100.0;
 inline constexpr SecondOrder kMipPublishedD1{-4.945, 8.862, -3.967, -1.481, 0.4812};
 inline constexpr SecondOrder kMipPublishedD2{0.18856, -0.37209, 0.18354, -1.86046, 0.86046};
+
+/// What keeps this robot from being balanced, if anything; `wheel_torque_N_m`: of one stalled motor.
+std::optional<DesignProblem> design_problem(const MipParameters& p, const MipDesignParams& d,
+                                            double wheel_torque_N_m);
+
+/// Acceleration whose lean takes a third of the tilt that the full torque can bring back.
+double feasible_acceleration_m_s2(const MipParameters& p);
+
+/// What a command may ask of a wheel in steady motion.
+struct MipWheelBudget {
+  double duty_share = 1.0;
+  double max_rate_rad_s = 1e9;
+};
+
+/// What steady motion takes of each wheel's duty, and may take: a wheel's rate is duty against its back-EMF.
+/// `friction_share`: of Coulomb friction that is compensated.
+DutyBudget mip_duty_budget(const MipParameters& p, const MipWheelBudget& wheel, double friction_share);
 
 MipSlcGains design_mip_slc(const MipParameters& p, const MipSlcDesign& d);
 MipGains design_mip(const MipParameters& p, const MipDesignParams& d);

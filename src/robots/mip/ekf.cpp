@@ -1,8 +1,10 @@
 #include "robots/mip/ekf.hpp"
 
-#include "equipoise/estimate/midpoint.hpp"
+#include "equipoise/estimate/heun.hpp"
 
 namespace equipoise {
+
+template class PackedFilter<MipEkfModel, generated::MipFilter>;
 
 MipEkfModel::MipEkfModel(const MipParameters& p, const MipEkfOptions& options,
                          double disturbance_time_constant_s)
@@ -31,39 +33,49 @@ void MipEkfModel::derivative(const Motion& x, const Vec2& u, Motion& x_dot, Mat<
   }
 }
 
-MipEkfModel::Motion MipEkfModel::ahead(const Motion& x, const Vec2& u, double dt) const noexcept {
-  Motion x_dot;
-  Mat<6, 6> A;
-  derivative(x, u, x_dot, A);
-  derivative(x + 0.5 * dt * x_dot, u, x_dot, A);
-  return x + dt * x_dot;
+/// Flattened: the Jacobian is not asked for and falls away.
+[[gnu::flatten]] MipEkfModel::Motion MipEkfModel::ahead(const Motion& x, const Vec2& u,
+                                                        double dt) const noexcept {
+  const auto slope = [this, &u](const Motion& at) {
+    Motion x_dot;
+    Mat<6, 6> A;
+    derivative(at, u, x_dot, A);
+    return x_dot;
+  };
+  return heun<6>(slope, x, dt);
 }
 
-void MipEkfModel::predict(const Vec<12>& x, const Vec2& u, Vec<12>& x_next, Mat<12, 12>& F) const noexcept {
+void MipEkfModel::predict(const Vec<14>& x, const Vec2& u, Vec<14>& x_next, Mat<14, 14>& F) const noexcept {
   const Vec2 felt = u + x.segment<2>(kDisturbance);
   Motion next;
   Mat<6, 6> F_motion;
-  midpoint<6>(
-      [this, &felt](const Motion& at, Motion& x_dot, Mat<6, 6>& A) { derivative(at, felt, x_dot, A); },
-      x.head<6>(), kTickS, next, F_motion);
+  heun<6>([this, &felt](const Motion& at, Motion& x_dot, Mat<6, 6>& A) { derivative(at, felt, x_dot, A); },
+          x.head<6>(), kTickS, next, F_motion);
+  // The counted heading acts on nothing else, so that its step is the true one, scaled.
+  const double scale = 1.0 + x(kWheelScale);
+  const double step = next(kPsi) - x(kPsi);
+  next(kPsi) = x(kPsi) + scale * step;
+  F_motion.row(kPsi) *= scale;
+  F_motion(kPsi, kPsi) = 1.0;
   x_next = x;
   x_next.head<6>() = next;
   x_next.segment<2>(kDisturbance) *= keep_;
   F.setIdentity();
   F.topLeftCorner<6, 6>() = F_motion;
+  F(kPsi, kWheelScale) = step;
   F.block<6, 2>(0, kDisturbance) = B_;
   F.block<2, 2>(kDisturbance, kDisturbance) *= keep_;
 }
 
 /// Friction and motors that do not do as told act through the torques: their noise is discretised as they
 /// are.
-Mat<12, 2> MipEkfModel::input_matrix() const noexcept {
-  Mat<12, 2> B = Mat<12, 2>::Zero();
+Mat<14, 2> MipEkfModel::input_matrix() const noexcept {
+  Mat<14, 2> B = Mat<14, 2>::Zero();
   B.topRows<6>() = B_;
   return B;
 }
 
-void MipEkfModel::measure(const Vec<12>& x, const Vec2& u, Vec<6>& y, Mat<6, 12>& H) const noexcept {
+void MipEkfModel::measure(const Vec<14>& x, const Vec2& u, Vec<6>& y, Mat<6, 14>& H) const noexcept {
   const double in[4] = {x(kTheta), x(kThetaDot), x(kPhiDot), x(kPsiDot)};
   const Vec2 felt = u + x.segment<2>(kDisturbance);
   double a[1];
@@ -73,18 +85,23 @@ void MipEkfModel::measure(const Vec<12>& x, const Vec2& u, Vec<6>& y, Mat<6, 12>
   const double arm = lever_arm_ * x(kLeverArm);
   const double dx = mount_ * x(kMountX);
   const double dy = mount_ * x(kMountY);
+  const double dz = mount_ * x(kMountZ);
   const double across = x(kTheta) * turn;  // turning, the gyro's y axis sees theta psi'
   const double shortened = 1.0 - 0.5 * (dx * dx + dy * dy);
   H.setZero();
 
   // A sensor turned by delta sees omega - delta x omega, to second order of the large yaw rate only.
-  y(kGyro) = x(kThetaDot) + bias_ * x(kGyroBias) - dy * turn;
+  y(kGyro) = x(kThetaDot) + bias_ * x(kGyroBias) - dy * turn + dz * across;
+  H(kGyro, kTheta) = dz * turn;
   H(kGyro, kThetaDot) = 1.0;
   H(kGyro, kGyroBias) = bias_;
-  H(kGyro, kPsiDot) = -dy;
+  H(kGyro, kPsiDot) = dz * x(kTheta) - dy;
+  H(kGyro, kMountZ) = mount_ * across;
   H(kGyro, kMountY) = -mount_ * turn;
-  y(kGyro + 1) = across + dx * turn;
+  y(kGyro + 1) = across + dx * turn - dz * x(kThetaDot);
   H(kGyro + 1, kTheta) = turn;
+  H(kGyro + 1, kThetaDot) = -dz;
+  H(kGyro + 1, kMountZ) = -mount_ * x(kThetaDot);
   H(kGyro + 1, kPsiDot) = x(kTheta) + dx;
   H(kGyro + 1, kMountX) = mount_ * turn;
   y(kGyro + 2) = turn * shortened - dx * across + dy * x(kThetaDot);
@@ -112,6 +129,18 @@ void MipEkfModel::measure(const Vec<12>& x, const Vec2& u, Vec<6>& y, Mat<6, 12>
   H(kAccelY, kDisturbance) = c_.accel_y_ux;
 }
 
+generated::MipFilter::Constants MipEkfModel::constants() const noexcept {
+  generated::MipFilter::Constants k{};
+  k.c = c_;
+  k.yaw_to_wheel = yaw_to_wheel_;
+  k.bias = bias_;
+  k.mount = mount_;
+  k.lever_arm = lever_arm_;
+  k.g = kGravity_m_s2;
+  k.keep = keep_;
+  return k;
+}
+
 MipEkf::MipEkf(const MipParameters& robot, const Params& params)
     : kinematics_(robot),
       filter_(Model(robot, params.options, params.disturbance_time_constant_s), params.filter),
@@ -120,17 +149,20 @@ MipEkf::MipEkf(const MipParameters& robot, const Params& params)
 }
 
 void MipEkf::start(double lean, const Vec3& gyro_bias_B_rad_s, const Vec2& wheel_angle_rad) noexcept {
-  Vec<12> x = Vec<12>::Zero();
+  Vec<14> x = Vec<14>::Zero();
   x.head<3>() << lean, kinematics_.phi(wheel_angle_rad), kinematics_.psi(wheel_angle_rad);
   x(Model::kGyroBias) = gyro_bias_B_rad_s.x();
   filter_.reset(x);
   time_.reset(wheel_angle_rad);
   gyro_bias_yz_ = gyro_bias_B_rad_s.tail<2>();
+  heading_ = x(Model::kPsi);
 }
 
 void MipEkf::predict(const Vec2& u) noexcept {
   time_.advance(u);
+  const double before = x()(Model::kPsiDot);
   filter_.predict(time_.acted());
+  heading_ += 0.5 * kTickS * (before + x()(Model::kPsiDot));
 }
 
 void MipEkf::update(const Mip::Sample& z) noexcept {
@@ -138,26 +170,27 @@ void MipEkf::update(const Mip::Sample& z) noexcept {
   for (bool& ok : wheel) ok = ok && z.encoders_ok;
   time_.observe(z.wheel_angle_rad, wheel);
   Vec<6> y;
-  y << z.gyro_B_rad_s, time_.stood(wheel_rate_rad_s()), z.accel_B_m_s2.y();
+  y.segment<3>(Model::kGyro) = z.gyro_B_rad_s;
   y.segment<2>(Model::kGyro + 1) -= gyro_bias_yz_;
+  y.segment<2>(Model::kWheel) = time_.stood([this] { return wheel_rate_rad_s(); });
+  y(Model::kAccelY) = z.accel_B_m_s2.y();
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
   filter_.update(time_.acted(), y, {imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], imu});
 }
 
 Vec2 MipEkf::wheel_rate_rad_s() const noexcept {
-  return kinematics_.wheels(x()(Model::kPhiDot), x()(Model::kPsiDot));
+  return kinematics_.wheels(x()(Model::kPhiDot), (1.0 + x()(Model::kWheelScale)) * x()(Model::kPsiDot));
 }
 
 MipEstimate MipEkf::estimate() const noexcept {
   Model::Motion m = x().head<6>();
-  time_.to_now([&](const Vec2& u, double dt) {
-    m = filter_.model().ahead(m, u + x().segment<2>(Model::kDisturbance), dt);
-  });
+  const Vec2 disturbance = x().segment<2>(Model::kDisturbance);
+  time_.to_now([&](const Vec2& u, double dt) { filter_.ahead(u + disturbance, dt, m); });
   MipEstimate now;
   now.theta = m(Model::kTheta);
   now.phi = m(Model::kPhi);
-  now.psi = m(Model::kPsi);
+  now.psi = heading_ + m(Model::kPsi) - x()(Model::kPsi);
   now.theta_dot = m(Model::kThetaDot);
   now.phi_dot = m(Model::kPhiDot);
   now.psi_dot = m(Model::kPsiDot);

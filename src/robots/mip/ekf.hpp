@@ -1,12 +1,13 @@
-// The MIP's default filter: the high-yaw-rate model, discretised by the midpoint rule, with what differs from
-// robot to robot as states: IMU mount, gyro bias, lever arm, and torques that the model does not know.
+// The MIP's default filter: the high-yaw-rate model, discretised by Heun's third-order rule, with what
+// differs from robot to robot as states: IMU mount, gyro bias, lever arm, track, and torques not known.
 // In: Measurement, the input applied since the last one -> out: state at the sample's time, normalised
 // innovation of every row, variances. Encoders enter wheel by wheel, so that a lost wheel is a skipped row;
 // missed ticks are predicted. Source: [T] (3.35)-(3.47); corrections in docs/derivation.md. RT-safe.
 #pragma once
 
-#include "equipoise/estimate/kalman.hpp"
+#include "equipoise/estimate/packed_filter.hpp"
 #include "equipoise/estimate/time_base.hpp"
+#include "generated/mip_filter.hpp"
 #include "robots/mip/mip.hpp"
 #include "robots/mip/models.hpp"
 
@@ -19,11 +20,12 @@ struct MipEkfOptions {
   bool estimate_lever_arm = true;  // its y, starting from the above
 };
 
-/// States of [T] (3.37); mount angles about body x, y (sensor against body); bias of gyro x; lever arm y;
-/// disturbance of u. Bias of gyro y and z: from rest only.
+/// States of [T] (3.37), psi as counted by the encoders; mount angles about body x, y, z (sensor against
+/// body); bias of gyro x; lever arm y; how much more the wheels turn than the configured track and radius
+/// say; disturbance of u. Bias of gyro y and z: from rest only.
 class MipEkfModel {
  public:
-  static constexpr int kStates = 12;
+  static constexpr int kStates = 14;
   static constexpr int kInputs = 2;
   static constexpr int kOutputs = 6;
   enum State : int {
@@ -35,8 +37,10 @@ class MipEkfModel {
     kPsiDot,
     kMountX,
     kMountY,
+    kMountZ,
     kGyroBias,
     kLeverArm,
+    kWheelScale,  // track / radius of the robot over the configured one, less 1
     kDisturbance
   };
   enum Output : int { kGyro, kWheel = 3, kAccelY = 5 };  // three, two, one row
@@ -44,9 +48,11 @@ class MipEkfModel {
 
   MipEkfModel(const MipParameters& p, const MipEkfOptions& options, double disturbance_time_constant_s);
   void derivative(const Motion& x, const Vec2& u, Motion& x_dot, Mat<6, 6>& A) const noexcept;
-  void predict(const Vec<12>& x, const Vec2& u, Vec<12>& x_next, Mat<12, 12>& F) const noexcept;
-  Mat<12, 2> input_matrix() const noexcept;
-  void measure(const Vec<12>& x, const Vec2& u, Vec<6>& y, Mat<6, 12>& H) const noexcept;
+  void predict(const Vec<14>& x, const Vec2& u, Vec<14>& x_next, Mat<14, 14>& F) const noexcept;
+  Mat<14, 2> input_matrix() const noexcept;
+  void measure(const Vec<14>& x, const Vec2& u, Vec<6>& y, Mat<6, 14>& H) const noexcept;
+  /// For the generated form of the filter, noises left open.
+  generated::MipFilter::Constants constants() const noexcept;
   /// The motion after dt, without a Jacobian.
   Motion ahead(const Motion& x, const Vec2& u, double dt) const noexcept;
 
@@ -60,11 +66,14 @@ class MipEkfModel {
   Mat<6, 2> B_;
 };
 
+extern template class PackedFilter<MipEkfModel, generated::MipFilter>;
+
 class MipEkf {
  public:
   using Model = MipEkfModel;
+  using Filter = PackedFilter<Model, generated::MipFilter>;
   struct Params {
-    KalmanFilter<Model>::Params filter;
+    Filter::Params filter;
     MipEkfOptions options;
     double disturbance_time_constant_s = 1.0;
     double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
@@ -83,17 +92,19 @@ class MipEkf {
   MipEstimate estimate() const noexcept;
   Vec2 wheel_rate_rad_s() const noexcept;
 
-  const Vec<12>& x() const noexcept { return filter_.x(); }
-  const Mat<12, 12>& P() const noexcept { return filter_.P(); }
+  const Vec<14>& x() const noexcept { return filter_.x(); }
+  Mat<14, 14> P() const noexcept { return filter_.P(); }
   /// gyro x, y, z, wheels, accelerometer y: squared innovation over its variance; 0 where not used.
   const std::array<double, 6>& row_nis() const noexcept { return filter_.row_nis(); }
-  double tilt_sigma_rad() const noexcept { return std::sqrt(P()(0, 0)); }
+  const std::array<double, 6>& row_innovation() const noexcept { return filter_.row_innovation(); }
+  double tilt_sigma_rad() const noexcept { return std::sqrt(filter_.variance(Model::kTheta)); }
 
  private:
   MipKinematics kinematics_;
-  KalmanFilter<Model> filter_;
+  Filter filter_;
   TimeBase<2, 2> time_;
   Vec2 gyro_bias_yz_ = Vec2::Zero();
+  double heading_ = 0.0;
 };
 
 }  // namespace equipoise

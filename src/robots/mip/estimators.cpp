@@ -1,6 +1,37 @@
 #include "robots/mip/estimators.hpp"
 
+#include <Eigen/LU>
+
 namespace equipoise {
+namespace {
+
+/// Torque between body and wheels turns both: what it does to the body's rates per wheel rate.
+GyroWatchParams<2> gyro_watch(const MipEstimatorParams& params) {
+  const MipEkfModel model(params.robot, params.ekf.options, params.ekf.disturbance_time_constant_s);
+  const MipKinematics kinematics(params.robot);
+  const auto B = model.input_matrix();
+  Mat<2, 2> wheels;
+  Mat<3, 2> body = Mat<3, 2>::Zero();
+  for (int i = 0; i < 2; ++i) {
+    wheels.col(i) = kinematics.wheels(B(MipEkfModel::kPhiDot, i), B(MipEkfModel::kPsiDot, i));
+    body(0, i) = B(MipEkfModel::kThetaDot, i);
+    body(2, i) = B(MipEkfModel::kPsiDot, i);
+  }
+  GyroWatchParams<2> p;
+  p.from_wheels = body * wheels.inverse();
+  p.sigma_rad_s = {0.12, 0.03, 0.15};  // gravity, play: measured on robots 1 to 8
+  p.max_step_rad_s =
+      Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
+  p.balances = {true, false, false};
+  p.by_rate = {false, true, true};  // y sees the yaw of a leaning robot, tyres do not slip
+  p.rate_sigma_rad_s = {0.0, 0.06, 0.25};
+  for (int i = 0; i < 2; ++i) p.rate_from_wheels(2, i) = kinematics.psi(Vec2(Vec2::Unit(i)));
+  return p;
+}
+
+constexpr double kPlay_rad = 0.03;  // yaw by one wheel: the population has up to 0.04 rad of play in a gear
+
+}  // namespace
 
 MipEstimators::MipEstimators(const Params& params)
     : params_(params),
@@ -8,7 +39,8 @@ MipEstimators::MipEstimators(const Params& params)
       complementary_kf_(MipInclinometerModel{}, params.complementary_kf),
       planar_kf_(MipPlanarModel(params.robot), params.planar_kf),
       ekf_(params.robot, params.ekf),
-      isolation_(ekf_),
+      isolation_(ekf_, kPlay_rad),
+      gyro_watch_(gyro_watch(params)),
       ekf_published_(MipPublishedModel{}, params.ekf_published) {}
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {
@@ -22,6 +54,9 @@ void MipEstimators::start(const Mip::Sample& z) noexcept {
   planar_kf_.reset({lean, phi, 0.0, 0.0});
   ekf_.start(lean, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
   isolation_.reset();
+  gyro_watch_.reset();
+  dead_encoders_.reset();
+  bias_drift_.reset(ekf_.x().segment<1>(MipEkfModel::kGyroBias));
   Vec<6> x6 = Vec<6>::Zero();
   x6.head<3>() << lean, phi, heading_;
   ekf_published_.reset(x6);
@@ -63,6 +98,7 @@ void MipEstimators::complementary(const Mip::Sample& z) noexcept {
   const double c = params_.complementary_weight;
   x.theta = c * x.theta + kTickS * gyro_previous_ + (1.0 - c) * inclination_previous_;  // (3.29)
   from_wheels_and_gyro(Id::kComplementary, z);
+  move(Id::kComplementary);
 }
 
 void MipEstimators::complementary_kf(const Mip::Sample& z) noexcept {
@@ -73,6 +109,7 @@ void MipEstimators::complementary_kf(const Mip::Sample& z) noexcept {
   x.theta = complementary_kf_.x()(0);
   x.normalized_innovation = complementary_kf_.normalized_innovation();
   from_wheels_and_gyro(Id::kComplementaryKf, z);
+  move(Id::kComplementaryKf);
 }
 
 void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
@@ -88,16 +125,30 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
   x.theta_dot = state(2);
   x.phi_dot = state(3);
   x.normalized_innovation = planar_kf_.normalized_innovation();
+  move(Id::kPlanarKf);
 }
 
 void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
-  // Without slip the wheels turn the body as the gyro says.
-  isolation_.step(ekf_, u, z,
-                  [&](const Vec2& wheel_rates) { return kinematics_.psi(wheel_rates) - z.gyro_B_rad_s.z(); });
   MipEstimate& x = estimates_[index(Id::kEkf)];
+  Mip::Sample believed = z;
+  const Vec3 expected_rad_s = body_rates(x);
+  gyro_watch_.screen(believed, expected_rad_s);
+  // Without slip the wheels turn the body as the gyro says.
+  isolation_.step(ekf_, u, believed, [&](const Vec2& wheel_rates) {
+    return kinematics_.psi(wheel_rates) - believed.gyro_B_rad_s.z();
+  });
+  bias_drift_.update(ekf_.x().segment<1>(MipEkfModel::kGyroBias), 0.0);
+  dead_encoders_.update(believed, isolation_.lost());
+  GyroWitness<Mip::kWheels> witness;
+  witness.blames_wheel = isolation_.lost() >= 0;
+  witness.wheel_stands = isolation_.stands_still();
+  witness.accel_nis = ekf_.row_nis()[MipEkfModel::kAccelY];
+  witness.rate_rad_s.y() = expected_rad_s.y();
+  gyro_watch_.compare(believed, witness);
   const Vec2 position = x.position_W_m;
   x = ekf_.estimate();
   x.position_W_m = position;
+  move(Id::kEkf);
 }
 
 void MipEstimators::ekf_published(const Mip::Sample& z, const Vec2& u) noexcept {
@@ -117,6 +168,7 @@ void MipEstimators::ekf_published(const Mip::Sample& z, const Vec2& u) noexcept 
   x.phi_dot = state(MipPublishedModel::kPhiDot);
   x.psi_dot = state(MipPublishedModel::kPsiDot);
   x.normalized_innovation = ekf_published_.normalized_innovation();
+  move(Id::kEkfPublished);
 }
 
 void MipEstimators::attitude(const Mip::Sample& z) noexcept {
@@ -127,12 +179,18 @@ void MipEstimators::attitude(const Mip::Sample& z) noexcept {
     x.theta += kTickS * z.gyro_B_rad_s.x();
   }
   from_wheels_and_gyro(Id::kAttitude, z);
+  move(Id::kAttitude);
 }
 
 EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
   EstimatorHealth<Mip::kWheels> h;
   if (params_.active != Id::kEkf) return h;
   report(isolation_, &h);
+  h.dead = dead_encoders_.dead();
+  h.bias_drift_rad_s = bias_drift_.distance();
+  h.disturbance = ekf_.x().segment<2>(MipEkfModel::kDisturbance).norm();
+  h.gyro_left_out = gyro_watch_.left_out();
+  h.gyro_trusted = gyro_watch_.trusted();
   h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
   h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
   return h;
@@ -153,13 +211,9 @@ const MipEstimate& MipEstimators::update(const Mip::Sample& z, const Vec2& u, bo
   if (runs(Id::kEkf)) ekf(z, u);
   if (runs(Id::kEkfPublished)) ekf_published(z, u);
   if (runs(Id::kAttitude)) attitude(z);
-  for (std::size_t i = 0; i < kCount; ++i) {
-    const Id id = static_cast<Id>(i);
-    if (id != Id::kTruth && runs(id)) move(id);
-  }
   if (z.imu_ok) {
     gyro_previous_ = z.gyro_B_rad_s.x();
-    inclination_previous_ = accel_inclination(z.accel_B_m_s2);
+    if (runs(Id::kComplementary)) inclination_previous_ = accel_inclination(z.accel_B_m_s2);
   }
   return estimates_[index(params_.active)];
 }

@@ -7,10 +7,13 @@
 
 #include <array>
 
+#include "equipoise/estimate/dead_encoders.hpp"
+#include "equipoise/estimate/gyro_watch.hpp"
 #include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "equipoise/estimate/slow_drift.hpp"
 #include "equipoise/estimate/wheel_isolation.hpp"
 #include "robots/mip/ekf.hpp"
 #include "robots/mip/mip.hpp"
@@ -67,6 +70,7 @@ class MipEstimators {
   EstimatorHealth<Mip::kWheels> health() const noexcept;
   /// It finds a lying encoder by itself.
   bool isolates() const noexcept { return params_.active == Id::kEkf; }
+  bool reads_attitude() const noexcept { return runs(Id::kAttitude); }
 
  private:
   static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
@@ -86,6 +90,9 @@ class MipEstimators {
   KalmanFilter<MipPlanarModel> planar_kf_;
   MipEkf ekf_;
   WheelIsolation<MipEkf, Mip::kWheels> isolation_;
+  GyroWatch<Mip::kWheels> gyro_watch_;
+  DeadEncoders<Mip::kWheels> dead_encoders_;
+  SlowDrift<1> bias_drift_;
   KalmanFilter<MipPublishedModel> ekf_published_;
   RestTilt rest_tilt_;
   RestBias rest_bias_;

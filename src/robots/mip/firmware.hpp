@@ -23,18 +23,23 @@ struct MipFirmware {
   static constexpr const char* kSpeedLabel = "wheel speed RMSE";
   static constexpr const char* kSpeedUnit = "rad/s";
   static constexpr double kSpeedScale = 1.0;
+  static constexpr bool kDrivesSideways = false;
+  static constexpr double kForward_rad = -0.5 * kPi;  // heading of a drive forward at yaw 0, from x
 
   static Loaded load(const std::string& path, const Overrides& overrides) {
     return load_mip(path, overrides);
   }
-  static Loaded parse(const std::string& text, const std::string& origin) { return parse_mip(text, origin); }
+  static Loaded parse(const std::string& text, const std::string& origin,
+                      const std::vector<std::string>& set = {}) {
+    return parse_mip(text, origin, set);
+  }
   static std::vector<std::string> estimators() {
     return {kMipEstimatorNames.begin(), kMipEstimatorNames.end()};
   }
   static std::vector<std::string> controllers() { return {"slc", "lqr"}; }
   static double rolling_radius_m(const Config& c) { return c.robot.r; }
 
-  /// The configuration with the choices applied, as it flies.
+  /// The configuration with the choices applied, as it runs.
   static Config apply(const Config& configured, const Choice& choice) {
     return with_choice(configured, choice, kMipEstimatorNames, MipEstimatorId::kEkfPublished,
                        MipEstimatorId::kAttitude);
@@ -51,7 +56,7 @@ struct MipFirmware {
     return f(pipeline);
   }
 
-  /// `config` as it flies; `level` of fidelity.
+  /// `config` as it runs; `level` of fidelity.
   static World world(const Config& config, std::size_t level, std::uint64_t seed) {
     MipWorldParams params = config.world[level];
     params.common.seed = seed;

@@ -19,6 +19,7 @@ struct MipLqrParams {
 
 class MipLqrFeedback {
  public:
+  static constexpr bool kSharesDuty = true;
   using Params = MipLqrParams;
   explicit MipLqrFeedback(const Params& params) : p_(params) {}
 

@@ -4,6 +4,7 @@
 // body). RT-safe.
 #pragma once
 
+#include "equipoise/control/allocate.hpp"
 #include "equipoise/samples.hpp"
 #include "equipoise/types.hpp"
 
@@ -40,6 +41,11 @@ class MipKinematics {
   Wheels wheels_from_axes(const Input& u) const noexcept { return {u.x() + u.y(), u.x() - u.y()}; }
   Input axes_from_wheels(const Wheels& w) const noexcept {
     return {0.5 * (w.x() + w.y()), 0.5 * (w.x() - w.y())};
+  }
+
+  /// Wheels within +-limit: balance before yaw.
+  Wheels allocate(const Input& u, double limit) const noexcept {
+    return within<2>({u.x(), u.x()}, {u.y(), -u.y()}, limit);
   }
 
   /// Each gear has its own friction.
@@ -85,11 +91,15 @@ struct Mip {
   using Sample = Measurement<kWheels>;
 };
 
+inline Vec3 body_rates(const MipEstimate& x) noexcept {
+  return {x.theta_dot, std::sin(x.theta) * x.psi_dot, std::cos(x.theta) * x.psi_dot};
+}
+
 /// Robot-neutral view.
 inline StateView view(const MipEstimate& x, const MipParameters&) noexcept {
   StateView v;
   v.theta_rad << x.theta, 0.0, x.psi;
-  v.omega_B_rad_s << x.theta_dot, std::sin(x.theta) * x.psi_dot, std::cos(x.theta) * x.psi_dot;
+  v.omega_B_rad_s = body_rates(x);
   v.phi_rad << x.phi, 0.0;
   v.phi_dot_rad_s << x.phi_dot, 0.0;
   v.position_W_m = x.position_W_m;

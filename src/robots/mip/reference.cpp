@@ -15,7 +15,7 @@ StateView view(const MipReference& ref, const MipParameters&) noexcept {
 }
 
 void MipReferenceStage::reset(const MipEstimate& x_hat) noexcept {
-  speed_m_s_ = 0.0;
+  drive_.reset();
   yaw_rate_ = 0.0;
   phi_ref_ = x_hat.phi;
   psi_ref_ = x_hat.psi;
@@ -24,18 +24,23 @@ void MipReferenceStage::reset(const MipEstimate& x_hat) noexcept {
 }
 
 MipReference MipReferenceStage::update(const Command& command, const MipEstimate& x_hat) noexcept {
-  const double speed_step = p_.max_acceleration_m_s2 * kTickS;
   const double yaw_step = p_.max_yaw_acceleration_rad_s2 * kTickS;
-  speed_m_s_ += std::clamp(command.velocity_W_m_s.x() - speed_m_s_, -speed_step, speed_step);
-  yaw_rate_ += std::clamp(command.yaw_rate_rad_s - yaw_rate_, -yaw_step, yaw_step);
+  const double yaw_target = p_.budget.allowed_yaw_rate(command.yaw_rate_rad_s);
+  yaw_rate_ += std::clamp(yaw_target - yaw_rate_, -yaw_step, yaw_step);
+  // Room for the travel beside the turn that is there and the one that is wanted.
+  const double room = p_.budget.allowed_speed(std::max(std::abs(yaw_rate_), std::abs(yaw_target)));
+  const Vec<1> feasible(std::clamp(command.velocity_W_m_s.x(), -room, room));
+  drive_.update(feasible,
+                {std::min(p_.max_acceleration_m_s2, p_.feasible_acceleration_m_s2), p_.max_jerk_m_s3});
+  const double speed_m_s = drive_.velocity()(0);
 
   MipReference ref;
-  ref.phi_dot = speed_m_s_ / p_.wheel_radius_m;
+  ref.phi_dot = speed_m_s / p_.wheel_radius_m;
   ref.psi_dot = yaw_rate_;
   phi_ref_ += kTickS * ref.phi_dot;
   phi_ref_ = std::clamp(phi_ref_, x_hat.phi - p_.max_phi_error_rad, x_hat.phi + p_.max_phi_error_rad);
   psi_ref_ += kTickS * yaw_rate_;
-  position_W_m_ += kTickS * rotate(psi_ref_, Vec2(0.0, -speed_m_s_));
+  position_W_m_ += kTickS * rotate(psi_ref_, Vec2(0.0, -speed_m_s));
   ref.phi = phi_ref_;
   ref.psi = psi_ref_;
   ref.position_W_m = position_W_m_;

@@ -4,15 +4,21 @@
 // the feedback's filters to start afresh. RT-safe.
 #pragma once
 
+#include <limits>
+
+#include "equipoise/control/governor.hpp"
 #include "robots/mip/mip.hpp"
 
 namespace equipoise {
 
 struct MipReferenceParams {
   double max_acceleration_m_s2 = 0.5;  // of the speed command
+  double max_jerk_m_s3 = std::numeric_limits<double>::infinity();
   double max_yaw_acceleration_rad_s2 = 10.0;
   double max_phi_error_rad = 6.0;  // a robot that is held back does not store up a leap
   double wheel_radius_m = 0.035;
+  double feasible_acceleration_m_s2 = std::numeric_limits<double>::infinity();  // of this robot
+  DutyBudget budget;
 };
 
 struct MipReference {
@@ -47,7 +53,7 @@ class MipReferenceStage {
 
  private:
   MipReferenceParams p_;
-  double speed_m_s_ = 0.0;
+  SmoothVelocity<1> drive_;
   double yaw_rate_ = 0.0;
   double phi_ref_ = 0.0;
   double psi_ref_ = 0.0;

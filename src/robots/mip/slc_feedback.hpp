@@ -42,6 +42,7 @@ struct MipSlcParams {
 
 class MipSlcFeedback {
  public:
+  static constexpr bool kSharesDuty = true;
   using Params = MipSlcParams;
   explicit MipSlcFeedback(const Params& params)
       : p_(params),

@@ -61,6 +61,8 @@ MipMotion MipWorld::motion(const State& s) noexcept {
   return {s(kTheta), s(kThetaDot), s(kPhiDot), s(kPsiDot)};
 }
 
+Turn MipWorld::heading(const State& s) noexcept { return Turn(s(kPsi)); }
+
 Vec2 MipWorld::wheel_rates(const State& s) const noexcept {
   return kinematics_.wheels(s(kPhiDot), s(kPsiDot));
 }
@@ -73,7 +75,7 @@ Vec2 MipWorld::gear_torque(const State& s) const noexcept {
   return tau.cwiseProduct(engaged_);
 }
 
-Vec3 MipWorld::accelerations(const State& s, const Vec2& wheel_torque) const noexcept {
+Vec3 MipWorld::accelerations(const State& s, const Turn& heading, const Vec2& wheel_torque) const noexcept {
   if (lifted()) {  // the body is in a hand, the wheels are in the air
     const Vec2 wheel = wheel_torque / robot_.I_w1;
     return {0.0, kinematics_.phi(wheel), 0.0};
@@ -86,11 +88,11 @@ Vec3 MipWorld::accelerations(const State& s, const Vec2& wheel_torque) const noe
     // Force along the rolling direction at the centre of mass: power F (r (phi' + theta') + l cos theta'),
     // with the axle's speed along -y. On a slope the whole weight pulls the axle downhill.
     const Vec2 weight_W = -(robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2 * slope;
-    const double forward = -rotate(-s(kPsi), push_W).y();
+    const double forward = -heading.back(push_W).y();
     const double speed = robot_.r * (s(kPhiDot) + s(kThetaDot));  // along the rolling direction
     const double weight_N = (robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2;
     const double held_back = resistance * weight_N * speed / std::max(std::abs(speed), kRollingStart_m_s);
-    const double downhill = -rotate(-s(kPsi), weight_W).y() - held_back;
+    const double downhill = -heading.back(weight_W).y() - held_back;
     const double c = std::cos(s(kTheta));
     const double lm = robot_.l * robot_.m_b;
     const double m22 = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;
@@ -105,19 +107,20 @@ Vec3 MipWorld::accelerations(const State& s, const Vec2& wheel_torque) const noe
   return a;
 }
 
-MipWorld::State MipWorld::derivative(const State& s, const Vec3& accelerations) const noexcept {
+MipWorld::State MipWorld::derivative(const State& s, const Turn& heading,
+                                     const Vec3& accelerations) const noexcept {
   State d;
   d.segment<3>(kTheta) = s.segment<3>(kThetaDot);
   d.segment<3>(kThetaDot) = accelerations;
   const double speed = lifted() ? 0.0 : -robot_.r * (s(kPhiDot) + s(kThetaDot));
-  d.segment<2>(kPosition) = rotate(s(kPsi), Vec2(0.0, speed));
+  d.segment<2>(kPosition) = heading(Vec2(0.0, speed));
   return d;
 }
 
-Vec2 MipWorld::friction_torque(const State& s, const Vec2& gear_torque) const noexcept {
+Vec2 MipWorld::friction_torque(const State& s, const Turn& heading, const Vec2& gear_torque) const noexcept {
   if (!world_.common.friction) return Vec2::Zero();
   const double h = world_.common.step_s;
-  const State next = s + h * derivative(s, accelerations(s, gear_torque));
+  const State next = s + h * derivative(s, heading, accelerations(s, heading, gear_torque));
   const Vec2 now = wheel_rates(s);
   const Stiction& stiction = world_.common.stiction;
   Vec2 limit = robot_.mu_c * world_.drivetrain.friction_gain;
@@ -166,11 +169,14 @@ void MipWorld::step(double h) noexcept {
   }
   cross_backlash(h);
   const Vec2 gear = gear_torque(s_);
-  const Vec2 friction = friction_torque(s_, gear);
-  const Vec3 now = accelerations(s_, gear + friction);
+  const Turn facing = heading(s_);
+  const Vec2 friction = friction_torque(s_, facing, gear);
+  const Vec3 now = accelerations(s_, facing, gear + friction);
   if (sensors_.aged()) sensors_.feel(felt(now));
-  s_ = rk4_step(s_, derivative(s_, now), h,
-                [&](const State& s) { return derivative(s, accelerations(s, gear_torque(s) + friction)); });
+  s_ = rk4_step(s_, derivative(s_, facing, now), h, [&](const State& s) {
+    const Turn turned = heading(s);
+    return derivative(s, turned, accelerations(s, turned, gear_torque(s) + friction));
+  });
   time_s_ += h;
 }
 
@@ -200,7 +206,8 @@ void MipWorld::advance(const MotorCommand& command) {
 
 RawSample MipWorld::sense() {
   const Vec2 gear = gear_torque(s_);
-  const Felt here = felt(accelerations(s_, gear + friction_torque(s_, gear)));
+  const Turn facing = heading(s_);
+  const Felt here = felt(accelerations(s_, facing, gear + friction_torque(s_, facing, gear)));
   TrueMotion m;
   m.time_s = time_s_;
   m.theta_rad << s_(kTheta), 0.0, s_(kPsi);

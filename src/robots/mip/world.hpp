@@ -54,9 +54,10 @@ class MipWorld {
   static MipMotion motion(const State& s) noexcept;
   Vec2 wheel_rates(const State& s) const noexcept;
   Vec2 gear_torque(const State& s) const noexcept;
-  Vec3 accelerations(const State& s, const Vec2& wheel_torque) const noexcept;
-  State derivative(const State& s, const Vec3& accelerations) const noexcept;
-  Vec2 friction_torque(const State& s, const Vec2& gear_torque) const noexcept;
+  static Turn heading(const State& s) noexcept;  // computed once per evaluation
+  Vec3 accelerations(const State& s, const Turn& heading, const Vec2& wheel_torque) const noexcept;
+  State derivative(const State& s, const Turn& heading, const Vec3& accelerations) const noexcept;
+  Vec2 friction_torque(const State& s, const Turn& heading, const Vec2& gear_torque) const noexcept;
   Felt felt(const Vec3& accelerations) const noexcept;
   void step(double h) noexcept;
   void cross_backlash(double step_s) noexcept;

@@ -1,47 +1,99 @@
 #include "closed_loop.hpp"
 
 #include <cmath>
-#include <cstring>
 #include <equipoise/runtime/monotonic.hpp>
+
+#include "app/board/board.hpp"
+#include "robots/robot_list.hpp"
 
 using equipoise::MotorCommand;
 using equipoise::RawSample;
 
 namespace {
-constexpr int kMotors = 3;
 constexpr std::int64_t kPeriod_ns = 5'000'000;
-
-equipoise::MbbrWorldParams worldOf(const equipoise::MbbrConfig& config, std::uint64_t seed) {
-  equipoise::MbbrWorldParams params = config.world[static_cast<std::size_t>(equipoise::Fidelity::kNominal)];
-  params.common.seed = seed;
-  return params;
-}
+constexpr const char *kGpio0 = "44e07000", *kGpio1 = "4804c000", *kGpio2 = "481ac000", *kGpio3 = "481ae000";
+constexpr std::size_t kPwm1A = 0, kPwm1B = 1, kPwm2A = 2;
 }  // namespace
 
-PinWorld::PinWorld(Bench& bench, const equipoise::app::Board& board, const equipoise::MbbrConfig& config,
-                   std::uint64_t seed)
-    : bench_(bench),
-      wiring_(board.wiring),
-      world_(config.robot, config.motor, config.calibration, worldOf(config, seed)) {
-  for (const bbb_motor_t& motor : wiring_.motor) {
-    if (motor.fault.used) bench_.drivePin(motor.fault.chip, motor.fault.line, true);  // no bridge complains
-  }
-  show(world_.sense());
+PinRobot PinRobot::mbbr() {
+  return {"Mbbr",
+          "/mnt/config/mbbr.toml",
+          "/mnt/config/boards/robotics_cape_mbbr.toml",
+          {{kPwm1A, pinOf(kGpio1, 28), pinOf(kGpio0, 31), +1, 0, +1},
+           {kPwm1B, pinOf(kGpio1, 16), pinOf(kGpio2, 17), +1, 1, +1},
+           {kPwm2A, pinOf(kGpio2, 9), pinOf(kGpio2, 8), +1, 2, +1}},
+          {pinOf(kGpio1, 17), pinOf(kGpio3, 17), pinOf(kGpio3, 16)}};
 }
+
+PinRobot PinRobot::edumip() {
+  return {"Edumip",
+          "/mnt/config/edumip.toml",
+          "/mnt/config/boards/robotics_cape_edumip.toml",
+          {{kPwm2A, pinOf(kGpio2, 9), pinOf(kGpio2, 8), -1, 2, +1},
+           {kPwm1B, pinOf(kGpio1, 16), pinOf(kGpio2, 17), +1, 1, -1}},
+          {}};
+}
+
+PinRobot PinRobot::edumip_blue() {
+  PinRobot robot = edumip();
+  robot.name = "EdumipBlue";
+  robot.board = "/mnt/config/boards/beaglebone_blue_edumip.toml";
+  robot.wheels[1].in2 = pinOf(kGpio0, 10);
+  return robot;
+}
+
+struct PinWorld::World {
+  virtual ~World() = default;
+  virtual void advance(const MotorCommand& command) = 0;
+  virtual RawSample sense() = 0;
+  virtual double tilt_rad() const = 0;
+  virtual bool held() const = 0;
+};
+
+template <class Firmware>
+struct PinWorld::WorldOf final : PinWorld::World {
+  WorldOf(const typename Firmware::Config& config, std::uint64_t seed)
+      : world(Firmware::world(config, static_cast<std::size_t>(equipoise::Fidelity::kNominal), seed)) {}
+  void advance(const MotorCommand& command) override { world.advance(command); }
+  RawSample sense() override { return world.sense(); }
+  double tilt_rad() const override {
+    return view(world.truth(), world.robot()).theta_rad.template head<2>().norm();
+  }
+  bool held() const override { return world.held(); }
+
+  typename Firmware::World world;
+};
+
+PinWorld::PinWorld(Bench& bench, const PinRobot& robot, std::uint64_t seed) : bench_(bench), robot_(robot) {
+  const equipoise::app::Board board = equipoise::app::load_board(robot.board);
+  battery_channel_ = board.wiring.battery_channel;
+  world_ = equipoise::with_robot(board.robot, robot.board, [&](auto firmware) -> std::unique_ptr<World> {
+    using Firmware = decltype(firmware);
+    const auto config = Firmware::load(robot.config, equipoise::app::overrides_of(board)).config;
+    safety_ = config.safety;
+    return std::make_unique<WorldOf<Firmware>>(config, seed);
+  });
+  for (const bbb_pin_t& line : robot_.complaints) bench_.drivePin(line.chip, line.line, true);
+  show(world_->sense());
+}
+
+PinWorld::~PinWorld() = default;
+
+double PinWorld::tilt_rad() const { return world_->tilt_rad(); }
+bool PinWorld::held() const { return world_->held(); }
 
 MotorCommand PinWorld::pins() const {
   MotorCommand command{};
   const auto channels = bench_.pwm();
-  command.enable = bench_.pin(wiring_.enable.chip, wiring_.enable.line);
-  for (int i = 0; i < kMotors; ++i) {
-    const std::size_t module = std::strcmp(wiring_.motor[i].pwm, "48302200") == 0 ? 0 : 2;
-    const Bench::Channel& channel = channels[module + wiring_.motor[i].pwm_channel];
-    const bool in1 = bench_.pin(wiring_.motor[i].in1.chip, wiring_.motor[i].in1.line);
-    const bool in2 = bench_.pin(wiring_.motor[i].in2.chip, wiring_.motor[i].in2.line);
-    const double direction = (in1 ? 1.0 : 0.0) - (in2 ? 1.0 : 0.0);
+  command.enable = bench_.pin(kGpio0, 20);
+  for (std::size_t i = 0; i < robot_.wheels.size(); ++i) {
+    const PinWheel& wheel = robot_.wheels[i];
+    const Bench::Channel& channel = channels[wheel.channel];
+    const int in1 = bench_.pin(wheel.in1.chip, wheel.in1.line) ? 1 : 0;
+    const int in2 = bench_.pin(wheel.in2.chip, wheel.in2.line) ? 1 : 0;
     const double on = channel.enabled == 0 ? 0.0 : static_cast<double>(channel.duty_ns);
     const double period = static_cast<double>(channel.period_ns);
-    command.duty[static_cast<std::size_t>(i)] = period > 0.0 ? direction * on / period : 0.0;
+    command.duty[i] = period > 0.0 ? wheel.turns * (in1 - in2) * on / period : 0.0;
   }
   return command;
 }
@@ -50,7 +102,7 @@ bool PinWorld::motorsOff() const {
   for (const Bench::Channel& channel : bench_.pwm()) {
     if (channel.enabled != 0 && channel.duty_ns != 0) return false;
   }
-  return !bench_.pin(wiring_.enable.chip, wiring_.enable.line);
+  return !bench_.pin(kGpio0, 20);
 }
 
 void PinWorld::show(const RawSample& raw) {
@@ -59,15 +111,18 @@ void PinWorld::show(const RawSample& raw) {
   };
   std::array<int16_t, 3> accel{};
   std::array<int16_t, 3> gyro{};
-  std::array<int64_t, 3> wheels{};
+  std::array<int64_t, 3> decoders{};
   for (std::size_t i = 0; i < 3; ++i) {
     accel[i] = counts(raw.accel_counts[i]);
     gyro[i] = counts(raw.gyro_counts[i]);
-    wheels[i] = std::llround(raw.encoder_counts[i]);
+  }
+  for (std::size_t i = 0; i < robot_.wheels.size(); ++i) {
+    const PinWheel& wheel = robot_.wheels[i];
+    decoders[wheel.decoder] = wheel.counts * std::llround(raw.encoder_counts[i]);
   }
   bench_.setImu(accel, gyro);
-  bench_.setCounts(wheels);
-  bench_.setAdc(wiring_.battery_channel, static_cast<uint32_t>(std::lround(raw.battery_counts)));
+  bench_.setCounts(decoders);
+  bench_.setAdc(battery_channel_, static_cast<uint32_t>(std::lround(raw.battery_counts)));
 }
 
 void PinWorld::tick(bool data_ready) {
@@ -79,7 +134,7 @@ void PinWorld::tick(bool data_ready) {
     due_ns_ = now_ns;
   }
   equipoise::runtime::sleep_until(due_ns_);
-  world_.advance(pins());
-  show(world_.sense());
+  world_->advance(pins());
+  show(world_->sense());
   if (data_ready) bench_.dataReady();
 }

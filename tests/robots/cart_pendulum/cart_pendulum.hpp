@@ -24,6 +24,9 @@ class CartPendulumKinematics {
  public:
   explicit CartPendulumKinematics(const CartPendulumParameters& /*p*/) noexcept {}
   Vec<4> wheels_from_axes(const Vec<1>& u) const noexcept { return Vec<4>::Constant(u(0)); }
+  Vec<4> allocate(const Vec<1>& u, double limit) const noexcept {
+    return wheels_from_axes(u).cwiseMax(-limit).cwiseMin(limit);
+  }
   Vec<1> axes_from_wheels(const Vec<4>& w) const noexcept { return Vec<1>::Constant(w.mean()); }
   template <class Compensation>
   Vec<1> friction_input(const Compensation& c, const Vec<4>& rates) const noexcept {
@@ -88,6 +91,7 @@ class CartPendulumEstimators {
 
   /// A complementary filter has no opinion of its encoders.
   bool isolates() const noexcept { return false; }
+  bool reads_attitude() const noexcept { return false; }
   EstimatorHealth<CartPendulum::kWheels> health() const noexcept { return {}; }
 
   const CartPendulumEstimate& update(const CartPendulum::Sample& z, const Vec<1>&, bool held) noexcept {
@@ -150,6 +154,7 @@ class CartPendulumReferenceStage {
 
 class CartPendulumFeedback {
  public:
+  static constexpr bool kSharesDuty = true;
   struct Params {
     double lean = 0.0;
     double wheel = 0.0;

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "app/log/replay_as.hpp"
-#include "app/sim/fly.hpp"
+#include "app/sim/simulated_run.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 #include "robots/cart_pendulum/firmware.hpp"
 
@@ -28,8 +28,9 @@ app::SimSummary simulate(const app::SimOptions& options, const app::TickObserver
 TEST(CartPendulum, BalancesAndDrives) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     double travelled_m = 0.0;
-    const app::SimSummary s = simulate(
-        {0.0, 0.1, 20.0, seed}, [&](const runtime::TickRecord& r) { travelled_m = r.truth.position_W_m[0]; });
+    const app::SimSummary s = simulate({{true, 0.1}, 20.0, seed}, [&](const runtime::TickRecord& r) {
+      travelled_m = r.truth.position_W_m[0];
+    });
     EXPECT_EQ(s.verdict.ended, app::Ended::kFinished) << s.verdict.sentence();
     EXPECT_NEAR(travelled_m, 1.9, 0.2);  // 19 s at 0.1 m/s
     EXPECT_LT(s.controlling.attitude_rmse_rad, 0.02);
@@ -52,10 +53,10 @@ TEST(CartPendulum, ItsLogReplaysBitForBit) {
   options.run.backend = "sim";
   {
     runtime::Telemetry telemetry(options);
-    (void)simulate({0.0, 0.1, 10.0, 1}, [&](const runtime::TickRecord& r) { telemetry.hand_over(r); });
+    (void)simulate({{true, 0.1}, 10.0, 1}, [&](const runtime::TickRecord& r) { telemetry.hand_over(r); });
   }
   app::RunLog log(path);
-  const app::Replay replay = app::replay_as<CartPendulumFirmware>(log, path, "");
+  const app::Replay replay = app::replay_as<CartPendulumFirmware>(log, path);
   EXPECT_EQ(replay.ticks, 2000);
   EXPECT_TRUE(replay.identical()) << "tick " << replay.difference.tick << " " << replay.difference.field;
   std::filesystem::remove(path);

@@ -29,12 +29,14 @@ struct CartPendulumFirmware {
   static constexpr const char* kName = "cart_pendulum";
   static constexpr const char* kDefaultEstimator = "complementary";
   static constexpr const char* kDefaultController = "lqr";
+  static constexpr double kForward_rad = 0.0;
 
   static Loaded load(const std::string& path, const Overrides& overrides) {
     return read(config::Document(path, overrides));
   }
-  static Loaded parse(const std::string& text, const std::string& origin) {
-    return read(config::Document::parse(text, origin));
+  static Loaded parse(const std::string& text, const std::string& origin,
+                      const std::vector<std::string>& set = {}) {
+    return read(config::Document::parse(text, origin, set));
   }
   static std::vector<std::string> estimators() {
     return {CartPendulumEstimators::kNames.begin(), CartPendulumEstimators::kNames.end()};

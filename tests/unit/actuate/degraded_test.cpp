@@ -13,7 +13,43 @@ TEST(Degraded, EveryBitHasANameOfItsOwn) {
   std::set<std::string> names;
   for_each_degraded(~0U, [&](const DegradedMode& mode) { names.insert(mode.name); });
   EXPECT_EQ(names.size(), kDegradedModes.size());
-  EXPECT_EQ(kWithoutWheelFour, 1U << (kDegradedModes.size() - 1));
+  EXPECT_EQ(kWithoutGyroAxis, 1U << (kDegradedModes.size() - 1));
+}
+
+TEST(Degraded, EveryBitIsNamedAfterItsWheel) {
+  const auto name = [](std::uint32_t bit) {
+    std::string text;
+    for_each_degraded(bit, [&](const DegradedMode& mode) { text += mode.name; });
+    return text;
+  };
+  EXPECT_EQ(name(kWithoutImu), "without_imu");
+  EXPECT_EQ(name(kWithoutEncoders), "without_encoders");
+  EXPECT_EQ(name(kEstimatorInDoubt), "estimator_in_doubt");
+  EXPECT_EQ(name(kWithoutWheelOne), "without_wheel_1");
+  EXPECT_EQ(name(kWithoutWheelTwo), "without_wheel_2");
+  EXPECT_EQ(name(kWithoutWheelThree), "without_wheel_3");
+  EXPECT_EQ(name(kWithoutWheelFour), "without_wheel_4");
+  EXPECT_EQ(name(kWithoutGyroAxis), "without_gyro_axis");
+  EXPECT_EQ(kSensorsLeftOut, 0xF8U);
+}
+
+TEST(Degraded, WithoutWhatItBalancesByItStands) {
+  Command command;
+  command.velocity_W_m_s = Vec2(0.3, -0.4);
+  command.yaw_rate_rad_s = -20.0;
+  for (const std::uint32_t bit : {kWithoutGyroAxis, kEstimatorInDoubt}) {
+    EXPECT_EQ(limited(command, bit).velocity_W_m_s.norm(), 0.0);
+    EXPECT_EQ(limited(command, bit).yaw_rate_rad_s, 0.0);
+  }
+  for (const std::uint32_t bit :
+       {kWithoutWheelOne, kWithoutWheelTwo, kWithoutWheelThree, kWithoutWheelFour}) {
+    EXPECT_NEAR(limited(command, bit).velocity_W_m_s.norm(), 0.1, 1e-12);
+    EXPECT_NEAR(limited(command, bit).yaw_rate_rad_s, -2.0 * kPi, 1e-12);
+  }
+  for (const std::uint32_t bit : {kWithoutImu, kWithoutEncoders}) {
+    EXPECT_EQ(limited(command, bit).velocity_W_m_s, command.velocity_W_m_s);
+    EXPECT_EQ(limited(command, bit).yaw_rate_rad_s, command.yaw_rate_rad_s);
+  }
 }
 
 TEST(Degraded, SlowsTheCommandAndKeepsItsDirection) {
@@ -33,7 +69,8 @@ TEST(Degraded, LeavesASlowCommandAndASoundRobotAlone) {
   EXPECT_EQ(limited(command, kWithoutWheelOne).velocity_W_m_s, command.velocity_W_m_s);
   command.velocity_W_m_s = Vec2(0.5, 0.0);
   EXPECT_EQ(limited(command, 0U).velocity_W_m_s, command.velocity_W_m_s);
-  EXPECT_EQ(limited(command, kWithoutImu).velocity_W_m_s, Vec2(0.0, 0.0));
+  EXPECT_EQ(limited(command, kEstimatorInDoubt).velocity_W_m_s, Vec2(0.0, 0.0));
+  EXPECT_EQ(limited(command, kWithoutImu | kWithoutEncoders).velocity_W_m_s, command.velocity_W_m_s);
 }
 
 }  // namespace

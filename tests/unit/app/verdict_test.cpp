@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "app/cli/json.hpp"
 #include "equipoise/actuate/safety_reasons.hpp"
 
 namespace equipoise::app {

@@ -74,6 +74,26 @@ void expect_jacobians_match(const Model& model, const Vec<n>& x, const Vec3& u, 
   }
 }
 
+/// The scale's column of F is the derivative of the sum about z, and nothing else.
+void expect_scale_is_learnt_about_z(const MbbrEkfModel& model, const Vec<18>& x, const Vec3& u) {
+  using M = MbbrEkfModel;
+  constexpr double h = 1e-6;
+  Vec<18> f0, fp, fm;
+  Mat<18, 18> F, unused_F;
+  model.predict(x, u, f0, F);
+  model.predict(x + h * Vec<18>::Unit(M::kWheelScale), u, fp, unused_F);
+  model.predict(x - h * Vec<18>::Unit(M::kWheelScale), u, fm, unused_F);
+  const double z = (fp - fm)(M::kE + 2) / (2 * h);
+  EXPECT_GT(std::abs(z), 0.01);
+  EXPECT_NEAR(F(M::kE + 2, M::kWheelScale), z, 1e-9);
+  EXPECT_EQ(F(M::kWheelScale, M::kWheelScale), 1.0);
+  EXPECT_NEAR(F.col(M::kWheelScale).cwiseAbs().sum(), 1.0 + std::abs(z), 1e-9);
+  Vec<8> y;
+  Mat<8, 18> H;
+  model.measure(x, u, y, H);
+  EXPECT_EQ(H.col(M::kWheelScale).norm(), 0.0);
+}
+
 TEST(MbbrModels, AnalyticJacobiansAreTheDerivatives) {
   const Vec3 u(0.2, -0.1, -0.4);
   Vec<13> x13;
@@ -81,13 +101,15 @@ TEST(MbbrModels, AnalyticJacobiansAreTheDerivatives) {
   expect_jacobians_match<MbbrPublishedModel, 13, 8>({}, x13, u, 1e-7);
   expect_jacobians_match<MbbrModel13, 13, 8>(MbbrModel13(MbbrParameters{}), x13, u, 1e-7);
   // With a straight mount and no disturbance: their products with small states are left out of F and H.
-  Vec<17> x17 = Vec<17>::Zero();
-  x17.head<10>() << 0.05, -0.03, 1.0, -2.0, 0.3, 0.3, 0.2, 6.0, 4.0, -3.0;
+  Vec<18> x18 = Vec<18>::Zero();
+  x18(MbbrEkfModel::kWheelScale) = 0.03;
+  x18.head<10>() << 0.05, -0.03, 1.0, -2.0, 0.3, 0.3, 0.2, 6.0, 4.0, -3.0;
   MbbrParameters beside;
   beside.l_a << 0.03, -0.02, 0.13;
-  expect_jacobians_match<MbbrEkfModel, 17, 8>(MbbrEkfModel(beside, 1.0), x17, u, 1e-7,
-                                              MbbrEkfModel::kDisturbance);
-  expect_jacobians_match<MbbrEkfModel, 17, 8>(MbbrEkfModel(beside, 1.0), Vec<17>::Zero(), Vec3::Zero(), 1e-7);
+  expect_jacobians_match<MbbrEkfModel, 18, 8>(MbbrEkfModel(beside, 1.0), x18, u, 1e-7,
+                                              MbbrEkfModel::kWheelScale);
+  expect_jacobians_match<MbbrEkfModel, 18, 8>(MbbrEkfModel(beside, 1.0), Vec<18>::Zero(), Vec3::Zero(), 1e-7);
+  expect_scale_is_learnt_about_z(MbbrEkfModel(beside, 1.0), x18, u);
   Vec<8> x8;
   x8 << 0.05, -0.03, 1.0, -2.0, 0.3, 0.2, 4.0, -3.0;
   expect_jacobians_match<MbbrLinearModel, 8, 6>(MbbrLinearModel(MbbrParameters{}, true), x8,
@@ -117,8 +139,8 @@ TEST(MbbrModels, CorrectedModelIsTheExactDynamicsForSmallTilt) {
     EXPECT_LT(test::relative_error(x_dot.tail<5>().eval(), rates), 1e-6);
     EXPECT_LT((MbbrObservable::encoder_rate_B(x) - MbbrDynamics::encoder_rate_B(m)).norm(), 1e-8);
     Vec<8> y;
-    Mat<8, 17> H;
-    Vec<17> state = Vec<17>::Zero();
+    Mat<8, 18> H;
+    Vec<18> state = Vec<18>::Zero();
     state.head<10>() = x;
     model.measure(state, u, y, H);
     EXPECT_LT((y.head<3>() - m.omega_B).norm(), 1e-8);

@@ -18,6 +18,7 @@ struct Turning {
   Vec2 lever{0.03, -0.02};
   double rate_rad_s = 2.0 * kPi;
   double age_s = 0.0;
+  double wheel_scale = 0.0;  // the wheels turn by so much more than configured
 
   Turning() : config(load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", {}).config) {
     config.robot.l_a.head<2>() = lever;
@@ -37,7 +38,8 @@ struct Turning {
     Mbbr::Sample z;
     z.gyro_B_rad_s = R_mount.transpose() * Vec3(0.0, 0.0, rate_rad_s) + bias;
     z.accel_B_m_s2 = R_mount.transpose() * accel;
-    z.wheel_angle_rad = MbbrKinematics(config.robot).wheels_from_ball(Vec3(0.0, 0.0, -rate_rad_s * t_s));
+    z.wheel_angle_rad = (1.0 + wheel_scale) *
+                        MbbrKinematics(config.robot).wheels_from_ball(Vec3(0.0, 0.0, -rate_rad_s * t_s));
     z.imu_ok = z.encoders_ok = true;
     return z;
   }
@@ -66,6 +68,25 @@ TEST(MbbrEkf, FindsACrookedMountWhileTurning) {
   EXPECT_LT(x.phi_dot_star.norm(), 0.02);
   EXPECT_NEAR(x.theta_dot.z(), 2.0 * kPi, 0.003);
   EXPECT_LT(x.normalized_innovation, 0.5);
+}
+
+TEST(MbbrEkf, FindsRadiiUnlikeTheConfiguredOnesWhileTurning) {
+  for (const double rate_hz : {1.0, 3.0}) {
+    Turning robot;
+    robot.rate_rad_s = 2.0 * kPi * rate_hz;
+    robot.wheel_scale = 0.03;
+    const MbbrEkf filter = robot.after(20.0);
+    const MbbrEstimate x = filter.estimate();
+    EXPECT_NEAR(filter.x()(Model::kWheelScale), 0.03, 0.001) << rate_hz;
+    EXPECT_LT((filter.x().segment<2>(Model::kMountX) - robot.mount).norm(), 0.003) << rate_hz;
+    EXPECT_LT(x.theta_xy.norm(), 0.003) << rate_hz;
+    EXPECT_NEAR(x.theta_dot.z(), robot.rate_rad_s, 0.005) << rate_hz;
+    EXPECT_NEAR(
+        filter.wheel_rate_rad_s().x(),
+        1.03 * MbbrKinematics(robot.config.robot).wheels_from_ball(Vec3(0.0, 0.0, -robot.rate_rad_s)).x(),
+        0.02)
+        << rate_hz;
+  }
 }
 
 TEST(MbbrEkf, HeadingIsOfTheTickWhateverTheSensorsAge) {

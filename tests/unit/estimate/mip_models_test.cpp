@@ -40,28 +40,28 @@ TEST(MipEkfModel, HasTheDerivedCoefficients) {
 
 TEST(MipEkfModel, JacobiansAgreeWithDifferences) {
   const M m = model(true);
-  Vec<12> x;
-  x << 0.1, 0.5, 0.3, -0.4, 3.0, 8.0, 0.02, -0.03, 0.01, 0.004, 0.0, 0.0;
+  Vec<14> x;
+  x << 0.1, 0.5, 0.3, -0.4, 3.0, 8.0, 0.02, -0.03, 0.025, 0.01, 0.004, 0.03, 0.0, 0.0;
   const Vec2 u(0.3, -0.2);
-  Vec<12> f0;
-  Mat<12, 12> F;
+  Vec<14> f0;
+  Mat<14, 14> F;
   m.predict(x, u, f0, F);
   Vec<6> h0;
-  Mat<6, 12> H;
+  Mat<6, 14> H;
   m.measure(x, u, h0, H);
   constexpr double kStep = 1e-6;
   for (int i = 0; i < M::kDisturbance; ++i) {  // F takes the disturbance as it acts upright
-    Vec<12> up = x;
-    Vec<12> down = x;
+    Vec<14> up = x;
+    Vec<14> down = x;
     up(i) += kStep;
     down(i) -= kStep;
-    Vec<12> f_up, f_down;
-    Mat<12, 12> ignored_F;
+    Vec<14> f_up, f_down;
+    Mat<14, 14> ignored_F;
     m.predict(up, u, f_up, ignored_F);
     m.predict(down, u, f_down, ignored_F);
     EXPECT_LT(((f_up - f_down) / (2 * kStep) - F.col(i)).norm(), 1e-6) << "state " << i;
     Vec<6> h_up, h_down;
-    Mat<6, 12> ignored_H;
+    Mat<6, 14> ignored_H;
     m.measure(up, u, h_up, ignored_H);
     m.measure(down, u, h_down, ignored_H);
     EXPECT_LT(((h_up - h_down) / (2 * kStep) - H.col(i)).norm(), 1e-6) << "state " << i;
@@ -69,22 +69,20 @@ TEST(MipEkfModel, JacobiansAgreeWithDifferences) {
 }
 
 TEST(MipEkfModel, SeesTheCentripetalAccelerationOfItsLeverArm) {
-  Vec<12> x = Vec<12>::Zero();
+  Vec<14> x = Vec<14>::Zero();
   x(M::kPsiDot) = 10.0;
   Vec<6> y;
-  Mat<6, 12> H;
+  Mat<6, 14> H;
   model(true).measure(x, Vec2::Zero(), y, H);
   EXPECT_NEAR(y(M::kAccelY), 1.6, 1e-9);  // gravity minus acceleration: 0.016 m x 100 /s^2
   model(false).measure(x, Vec2::Zero(), y, H);
   EXPECT_NEAR(y(M::kAccelY), 0.0, 1e-12);
 }
 
-/// A robot that stands upright and begins to turn, seen by a crooked IMU.
-TEST(MipEkf, FindsACrookedMountWhileTurning) {
-  const MipConfig config = load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", {}).config;
-  const Vec2 mount(0.03, -0.02);
-  const Mat3 R_mount =
-      Eigen::AngleAxisd(mount.norm(), Vec3(mount.x(), mount.y(), 0.0).normalized()).toRotationMatrix();
+/// A robot that stands upright and begins to turn, seen by a crooked IMU; the wheels turn by
+/// `wheel_scale` more than track and radius say.
+MipEkf turned(const MipConfig& config, const Vec3& mount, double wheel_scale) {
+  const Mat3 R_mount = Eigen::AngleAxisd(mount.norm(), mount.normalized()).toRotationMatrix();
   const double held = (config.robot.k2 + config.robot.mu_v) / config.robot.k1 * config.robot.yaw_to_wheel();
   MipEkf filter(config.robot, config.estimators.ekf);
   double rate_rad_s = 0.0;
@@ -96,14 +94,50 @@ TEST(MipEkf, FindsACrookedMountWhileTurning) {
     Mip::Sample z;
     z.gyro_B_rad_s = R_mount.transpose() * Vec3(0.0, 0.0, rate_rad_s);
     z.accel_B_m_s2 = R_mount.transpose() * accel;
-    z.wheel_angle_rad = MipKinematics(config.robot).wheels(0.0, psi);
+    z.wheel_angle_rad = MipKinematics(config.robot).wheels(0.0, (1.0 + wheel_scale) * psi);
     z.imu_ok = z.encoders_ok = true;
     filter.predict(Vec2(0.0, held * rate_rad_s));  // what holds the rate against back-EMF and friction
     filter.update(z);
   }
-  EXPECT_LT((filter.x().segment<2>(M::kMountX) - mount).norm(), 0.003);
+  return filter;
+}
+
+TEST(MipEkf, FindsACrookedMountWhileTurning) {
+  const MipConfig config = load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", {}).config;
+  const Vec3 mount(0.03, -0.02, 0.0);
+  const MipEkf filter = turned(config, mount, 0.0);
+  EXPECT_LT((filter.x().segment<2>(M::kMountX) - mount.head<2>()).norm(), 0.003);
   EXPECT_NEAR(filter.estimate().theta, 0.0, 0.003);
   EXPECT_NEAR(filter.estimate().psi_dot, 8.0, 0.01);
+}
+
+TEST(MipEkf, FindsATrackUnlikeTheConfiguredOne) {
+  const MipConfig config = load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", {}).config;
+  const Vec3 mount(0.03, -0.02, 0.0);
+  const MipEkf filter = turned(config, mount, 0.03);
+  EXPECT_NEAR(filter.x()(M::kWheelScale), 0.03, 0.001);
+  EXPECT_LT((filter.x().segment<2>(M::kMountX) - mount.head<2>()).norm(), 0.003);
+  EXPECT_NEAR(filter.estimate().theta, 0.0, 0.003);
+  EXPECT_NEAR(filter.estimate().psi_dot, 8.0, 0.01);
+  // 10 s to gain speed, 20 s at 8 rad/s: the heading is the gyro's, not the encoders'.
+  EXPECT_NEAR(filter.estimate().psi, 0.5 * 8.0 * 10.0 + 8.0 * 20.0, 0.3);
+  EXPECT_LT(filter.estimate().normalized_innovation, 0.5);
+}
+
+/// Nodding shows a mount that is turned about the vertical: the lean's rate appears on the gyro's y axis,
+/// where a filter without that angle takes it for a turn.
+TEST(MipEkfModel, SeesTheLeansRateAcrossAMountTurnedAboutTheVertical) {
+  Vec<14> x = Vec<14>::Zero();
+  x(M::kThetaDot) = 1.5;
+  x(M::kMountZ) = 0.03;
+  Vec<6> y;
+  Mat<6, 14> H;
+  model(true).measure(x, Vec2::Zero(), y, H);
+  const Vec3 seen =
+      Eigen::AngleAxisd(0.03, Vec3::UnitZ()).toRotationMatrix().transpose() * Vec3(1.5, 0.0, 0.0);
+  EXPECT_NEAR(y(M::kGyro + 1), seen.y(), 1e-4);
+  EXPECT_NEAR(y(M::kGyro + 1), -0.045, 1e-4);
+  EXPECT_NEAR(y(M::kGyro + 2), 0.0, 1e-12);
 }
 
 TEST(MipPublishedModel, IsAsPrinted) {

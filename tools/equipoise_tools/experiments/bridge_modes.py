@@ -5,81 +5,134 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from equipoise_robot.log import Log
 
 from .. import metrics, names, style
 from ..style import plt
+from .data import Data
 from .framework import Result
-from .runs import simulate
+from .runs import MIP, Case, Lab
 
-COVERS = ("Fig. 4.6",)
+COVERS = ("Fig. 4.6", "Fig. 4.6, 1 kHz", "Fig. 4.6, uncompensated at 10 and 20 kHz")
 PWM_HZ = (500, 1000, 5000, 10000, 20000)
-MODES = {  # the robot's bridge, and whether the firmware inverts it
-    "brake": {"world.nominal.bridge": "drive_brake"},
-    "coast": {"world.nominal.bridge": "drive_coast", "motor.invert_bridge": "false"},
-    "coast, compensated": {"world.nominal.bridge": "drive_coast"},
+WORLDS = ("full", "nominal")
+MODES = {  # whether the firmware inverts the bridge's model
+    "coast": {"motor.invert_bridge": "false"},
+    "coast, compensated": {},
 }
-SEEDS = (1, 2, 3)
-DURATION_S = 30
-FALLEN = float("inf")
+DURATION_S = 30.0
+BRAKE = "brake"
 
 
-def variance(sets: dict[str, str], pwm_hz: float, seed: int) -> float:
-    """Of the true lean while the robot holds its position, rad^2; infinite when it falls."""
-    summary, log = simulate(
-        "config/edumip.toml",
-        sets={"motor.pwm_hz": float(pwm_hz), **sets},
-        duration_s=DURATION_S,
-        seed=seed,
-    )
-    if summary["fell"]:
-        return FALLEN
+def lean_variance(log: Log, summary: dict) -> dict:
+    """Of the true lean while the robot holds its position, mrad^2; none when it falls."""
+    if summary["ended"] != "finished":
+        return {("", "lean_variance_mrad2"): np.nan}
     settled = log.seconds(names.TRUTH) >= metrics.SETTLE_S
-    return float(np.var(log[names.TRUTH]["theta_rad"][settled, 0]))
+    return {("", "lean_variance_mrad2"): 1e6 * float(np.var(log[names.TRUTH]["theta_rad"][settled, 0]))}
 
 
-def run(out_dir: Path) -> Result:
+def case_name(world: str, mode: str, pwm_hz: int) -> str:
+    return f"{world}, {mode}, {pwm_hz} Hz"
+
+
+def cases() -> list[Case]:
+    found = []
+    for world in WORLDS:
+        options = {"duration_s": DURATION_S, "fidelity": world}
+        found.append(Case(f"{world}, {BRAKE}", config=MIP, options=options, measure=lean_variance))
+        for mode, sets in MODES.items():
+            for pwm_hz in PWM_HZ:
+                bridge = {f"world.{world}.bridge": "drive_coast", "motor.pwm_hz": float(pwm_hz)}
+                name = case_name(world, mode, pwm_hz)
+                found.append(Case(name, MIP, bridge | sets, options, measure=lean_variance))
+    return found
+
+
+def measure(lab: Lab) -> Data:
+    data = Data()
+    lab.run(cases(), data)
+    return data
+
+
+def report(data: Data, out_dir: Path) -> Result:
     result = Result(
         title="Attitude variance by bridge mode and PWM frequency (Fig. 4.6)",
-        command="equipoise sim --config config/edumip.toml --set world.nominal.bridge=drive_coast "
+        command="equipoise sim --config config/edumip.toml --fidelity full --set "
+        "world.full.bridge=drive_coast "
         "--set motor.pwm_hz=20000 [--set motor.invert_bridge=false]",
-        method=f"The eduMIP holds its position for {DURATION_S} s in the nominal world, {len(SEEDS)} seeds; "
-        "one controller, designed for drive/brake. Compensated: the firmware inverts the drive/coast model; "
-        "not compensated: it sends the drive/brake duty.",
-        differs="[T] plots no numbers, and its drivers' dead times and diodes are not ours.",
+        method=f"The eduMIP holds its position for {DURATION_S:.0f} s; one controller, designed for "
+        "drive/brake. "
+        "Compensated: the firmware inverts the drive/coast model; not compensated: it sends the "
+        "drive/brake duty. "
+        "Drive/brake does not depend on the PWM frequency here and is run once.",
+        differs="[T] plots no numbers; its drivers' dead times and diodes are not ours, and our motor's "
+        "inductance is "
+        "an estimate. Its exception at 1 kHz, a limit cycle of its robot, does not appear here. Where "
+        "friction and "
+        "play are large (full world) the compensated bridge is calmer than drive/brake, not equal to it.",
+        data=data,
     )
-    means: dict[str, list[float]] = {mode: [] for mode in MODES}
-    for mode, sets in MODES.items():
+    for world in WORLDS:
+        braking = f"{world}, {BRAKE}"
+        result.add("Fig. 4.6", "lean variance, brake", braking, "lean_variance_mrad2", unit="mrad²")
+        over = (braking, "lean_variance_mrad2", "ekf")
+        for mode in MODES:
+            for pwm_hz in PWM_HZ:
+                case = case_name(world, mode, pwm_hz)
+                what = f"{mode}, {pwm_hz} Hz"
+                result.add("Fig. 4.6", f"lean variance, {what}", case, "lean_variance_mrad2", unit="mrad²")
+                if mode == "coast":
+                    result.add("Fig. 4.6", f"share of runs upright to the end, {what}", case, "held")
         for pwm_hz in PWM_HZ:
-            means[mode].append(float(np.mean([variance(sets, pwm_hz, seed) for seed in SEEDS])))
-            shown = means[mode][-1]
-            what = f"lean variance, {mode}, {pwm_hz} Hz"
-            result.add("Fig. 4.6", what, 1e6 * shown if np.isfinite(shown) else None, None, "mrad²")
-    judge(result, means)
-    draw(out_dir / "bridge_modes.png", means)
-    result.pictures.append("bridge_modes.png")
+            case = case_name(world, "coast, compensated", pwm_hz)
+            if pwm_hz == 1000:
+                text = f"{world}: compensated coasting at 1000 Hz is worse than braking by 15 % or more"
+                result.check("Fig. 4.6, 1 kHz", text, case, "lean_variance_mrad2", at_least=1.15, over=over)
+                continue
+            text = f"{world}: compensated coasting at {pwm_hz} Hz is no worse than braking by more than 15 %"
+            result.check("Fig. 4.6", text, case, "lean_variance_mrad2", at_most=1.15, over=over)
+            text = f"{world}: and equals it within 15 %"
+            result.check(
+                "Fig. 4.6", text, case, "lean_variance_mrad2", between=(0.85, 1.15), over=over, claim="ours"
+            )
+        for pwm_hz in PWM_HZ[:3]:
+            text = f"{world}: uncompensated coasting at {pwm_hz} Hz is worse than braking by 15 % or more"
+            case = case_name(world, "coast", pwm_hz)
+            result.check("Fig. 4.6", text, case, "lean_variance_mrad2", at_least=1.15, over=over)
+        for pwm_hz in PWM_HZ[3:]:
+            text = f"{world}: uncompensated coasting at {pwm_hz} Hz stays upright ([T]'s robot did)"
+            case = case_name(world, "coast", pwm_hz)
+            result.check("Fig. 4.6, uncompensated at 10 and 20 kHz", text, case, "held", at_least=1.0,
+                         statistic="share")  # fmt: skip
+    draw(out_dir, data)
+    result.pictures.append("bridge_modes")
     return result
 
 
-def judge(result: Result, means: dict[str, list[float]]) -> None:
-    for i, pwm_hz in enumerate(PWM_HZ):
-        ratio = means["coast, compensated"][i] / means["brake"][i]
-        result.add("Fig. 4.6", f"compensated over brake, {pwm_hz} Hz", ratio)
-        near = abs(ratio - 1) <= 0.15
-        text = f"compensated coasting within 15 % of the brake's variance at {pwm_hz} Hz"
-        result.check("Fig. 4.6", text, near)
-    coast = means["coast"]
-    worse = all(c > 1.15 * b for c, b in zip(coast[2:], means["brake"][2:], strict=True))
-    result.check("Fig. 4.6", "uncompensated coasting is worse from 5 kHz on", worse)
-    text = "uncompensated coasting is worst at the highest PWM frequencies"
-    result.check("Fig. 4.6", text, max(coast[3:]) == max(coast))
-
-
-def draw(path: Path, means: dict[str, list[float]]) -> None:
+def draw(out_dir: Path, data: Data) -> None:
     with plt.rc_context(style.RC):
-        figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
-        for i, (mode, values) in enumerate(means.items()):
-            axes.loglog(PWM_HZ, [1e6 * v for v in values], "o-", color=style.colour(i), label=mode)
-        axes.set(xlabel="PWM frequency, Hz", ylabel="variance of the lean, mrad²")
-        axes.legend()
-        figure.savefig(path)
-        plt.close(figure)
+        figure, panels = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
+        for axes, world in zip(panels, WORLDS, strict=True):
+            low, middle, high = np.percentile(
+                data.values(f"{world}, {BRAKE}", "lean_variance_mrad2"), (5, 50, 95)
+            )
+            axes.axhspan(low, high, color=style.TRUTH, alpha=0.15, lw=0)
+            axes.axhline(middle, color=style.TRUTH, label="brake")
+            for i, mode in enumerate(MODES):
+                shown = []
+                for pwm_hz in PWM_HZ:
+                    values = data.values(case_name(world, mode, pwm_hz), "lean_variance_mrad2")
+                    if values.size:
+                        shown.append((pwm_hz, *np.percentile(values, (5, 50, 95))))
+                    else:
+                        axes.plot(pwm_hz, 4e4, "x", color=style.colour(i), ms=8, mew=2)
+                at, low, middle, high = np.array(shown).T
+                axes.fill_between(at, low, high, color=style.colour(i), alpha=0.2, lw=0)
+                axes.plot(at, middle, "o-", color=style.colour(i), label=mode)
+            axes.set(
+                xscale="log", yscale="log", xlabel="PWM frequency, Hz", title=f"{world} world (x: all fall)"
+            )
+        panels[0].set_ylabel("variance of the lean, mrad²")
+        style.legend_above(figure, panels[0])
+        style.save(figure, out_dir / "bridge_modes")

@@ -1,42 +1,110 @@
-"""What an experiment returns, and how it becomes a page, a CSV, a PNG and a line of the summary."""
+"""Findings, their status, and how an experiment becomes a page, a CSV and a line of the summary."""
 
 from __future__ import annotations
 
 import csv
 import importlib
 import json
+import math
 import pkgutil
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from . import coverage
+import numpy as np
 
-_NOT_EXPERIMENTS = {"__main__", "framework", "coverage", "runs"}
+from . import coverage
+from .data import Data, Ran
+
+_NOT_EXPERIMENTS = {"__main__", "framework", "coverage", "runs", "data", "timeplot", "printed_kf"}
+
+PRINTED, CORRECTED, FITTED = "as printed", "with our correction", "input or fitted"
+REFUTED, NOT_SHOWN = "refuted", "not shown"
+STATUSES = {
+    PRINTED: "the statement holds with the filter, controller and gains that [T] prints",
+    CORRECTED: "it holds once something of ours stands in for what is printed; the page says what",
+    FITTED: "it holds because a number was put in or fitted; no evidence for the statement",
+    REFUTED: "it follows from what [T] prints, and what [T] prints does not bear it out",
+    NOT_SHOWN: "it is not borne out here, or nothing here can test it; not shown to be false",
+}
+# What [T] prints. Everything else in a run is ours.
+PRINTED_FILTERS = {
+    "-",
+    "ekf13_published",
+    "ekf_published",
+    "planar_kf",
+    "complementary",
+    "complementary_kf",
+    "kf_attitude as printed",
+    "kf as printed",
+}
+PRINTED_CONTROL = {"-", "thesis as printed", "slc as printed"}
+CLAIMS = ("[T]", "ours")
+RELATIONS = {
+    "at least": lambda measured, limit: measured >= limit[0],
+    "at most": lambda measured, limit: measured <= limit[0],
+    "between": lambda measured, limit: limit[0] <= measured <= limit[1],
+}
+
+
+def standing(ran: Ran) -> str:
+    if ran.fitted:
+        return FITTED
+    of_t = (
+        ran.filter in PRINTED_FILTERS
+        and ran.control in PRINTED_CONTROL
+        and ran.gains.startswith(("-", "[T]"))
+    )
+    return PRINTED if of_t else CORRECTED
 
 
 @dataclass
 class Value:
-    """One number of ours beside [T]'s; `printed` is None where [T] has none (a figure, or not in the "
-    "text)."""
+    """One quantity over the seeds beside [T]'s; `printed` is None where [T] has no number."""
 
     target: str
     what: str
-    ours: float | None
+    ran: Ran
+    median: float | None
+    low: float | None  # 5 and 95 % over the seeds; None: one evaluation
+    high: float | None
+    runs: int
     printed: float | None = None
     unit: str = ""
 
     @property
     def ratio(self) -> float | None:
-        return self.ours / self.printed if self.ours is not None and self.printed else None
+        return self.median / self.printed if self.median is not None and self.printed else None
 
 
 @dataclass
 class Finding:
-    """A statement of [T] or of ours, and whether this run bears it out."""
+    """`statistic` of `quantity` in `case`, as a ratio to that of `over` if given, against a limit."""
 
     target: str
     text: str
+    claim: str  # "[T]": its statement; "ours": beside it, gives no status
+    derived: bool  # follows from what [T] prints, so that it can be refuted here
+    ran: Ran
+    case: str
+    quantity: str
+    statistic: str
+    over: list[str] | None  # [case, quantity, filter]
+    measured: float
+    relation: str
+    limit: list[float]
     holds: bool
+
+
+def measure(finding: Finding, data: Data) -> float:
+    """NaN, of which no relation holds, when no run has the number."""
+    measured = data.statistic(finding.case, finding.quantity, finding.ran.filter, finding.statistic)
+    if finding.over is not None:
+        measured /= data.statistic(*finding.over, statistic=finding.statistic)
+    return measured
+
+
+def holds(finding: Finding) -> bool:
+    return bool(RELATIONS[finding.relation](finding.measured, finding.limit))
 
 
 @dataclass
@@ -44,16 +112,65 @@ class Result:
     title: str
     command: str  # how to do it by hand
     method: str
-    differs: str  # one sentence: why our numbers are not [T]'s
+    differs: str  # why our numbers are not [T]'s
+    data: Data
     values: list[Value] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
-    pictures: list[str] = field(default_factory=list)  # names of PNGs that run() wrote into out_dir
+    pictures: list[str] = field(default_factory=list)  # names, without .png and .svg
 
-    def check(self, target: str, text: str, holds: bool) -> None:
-        self.findings.append(Finding(target, text, bool(holds)))
+    def check(
+        self,
+        target: str,
+        text: str,
+        case: str,
+        quantity: str,
+        filter_name: str | None = None,
+        *,
+        at_least: float | None = None,
+        at_most: float | None = None,
+        between: tuple[float, float] | None = None,
+        statistic: str = "median",
+        over: tuple[str, str, str] | None = None,
+        claim: str = "[T]",
+        derived: bool = False,
+    ) -> None:
+        relation, limit = next(
+            (name, list(limits))
+            for name, limits in (
+                ("at least", (at_least,)),
+                ("at most", (at_most,)),
+                ("between", between or (None,)),
+            )
+            if limits[0] is not None
+        )
+        ran = self.data.ran(case, quantity, filter_name)
+        finding = Finding(
+            target, text, claim, derived, ran, case, quantity, statistic, list(over) if over else None,
+            math.nan, relation, limit, False,
+        )  # fmt: skip
+        finding.measured = measure(finding, self.data)
+        finding.holds = holds(finding)
+        self.findings.append(finding)
 
-    def add(self, target: str, what: str, ours, printed: float | None = None, unit: str = "") -> None:
-        self.values.append(Value(target, what, None if ours is None else float(ours), printed, unit))
+    def add(
+        self,
+        target: str,
+        what: str,
+        case: str,
+        quantity: str,
+        filter_name: str | None = None,
+        printed: float | None = None,
+        unit: str = "",
+        scale: float = 1.0,
+    ) -> None:
+        values = scale * self.data.values(case, quantity, filter_name)
+        ran = self.data.ran(case, quantity, filter_name)
+        median, low, high = (None, None, None)
+        if values.size:
+            median = float(np.median(values))
+        if values.size > 1:
+            low, high = (float(x) for x in np.percentile(values, (5, 95)))
+        self.values.append(Value(target, what, ran, median, low, high, int(values.size), printed, unit))
 
 
 def names() -> list[str]:
@@ -66,30 +183,106 @@ def load(name: str):
 
 
 def number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4g}"
+    return "–" if value is None or not math.isfinite(value) else f"{value:.4g}"
+
+
+def limits(finding: Finding) -> str:
+    return f"{finding.relation} {' and '.join(number(x) for x in finding.limit)}"
+
+
+def status(findings: list[Finding]) -> str:
+    """The most that the findings about [T]'s statements support."""
+    claims = [f for f in findings if f.claim == "[T]"]
+    if not claims:
+        return NOT_SHOWN
+    if any(f.derived and not f.holds and standing(f.ran) == PRINTED for f in claims):
+        return REFUTED
+    borne_out = {f.text for f in claims if f.holds}
+    if any(f.text not in borne_out for f in claims):
+        return NOT_SHOWN
+    first_failed = any(not f.holds for f in claims)
+    used = {standing(f.ran) for f in claims if f.holds}
+    if FITTED in used:
+        return FITTED
+    return CORRECTED if CORRECTED in used or first_failed else PRINTED
+
+
+def reason(findings: list[Finding]) -> str:
+    """Counts, and what does not hold."""
+    claims = [f for f in findings if f.claim == "[T]"]
+    if not claims:
+        return "nothing of [T]'s is tested"
+    failed = [f for f in claims if not f.holds]
+    words = f"{len(claims) - len(failed)} of {len(claims)} findings hold"
+    texts = dict.fromkeys(f"{f.text} ({f.ran.filter})" if f.ran.filter != "-" else f.text for f in failed)
+    shown = list(texts)[:3]
+    more = f" and {len(texts) - 3} more" if len(texts) > 3 else ""
+    return words + (f"; not: {'; '.join(shown)}{more}" if shown else "")
+
+
+def complaints(record: dict, data: Data) -> list[str]:
+    """What a record claims beyond its data: wrong sign, limit, number, subject or status."""
+    wrong = []
+    findings = [Finding(**{**f, "ran": Ran(**f["ran"])}) for f in record["findings"]]
+    for f in findings:
+        try:
+            ran = data.ran(f.case, f.quantity, f.ran.filter)
+        except KeyError as missing:
+            wrong.append(f"{f.target}: {f.text}: {missing}")
+            continue
+        if ran != f.ran:
+            wrong.append(f"{f.target}: {f.text}: ran {ran}, not {f.ran}")
+        measured = measure(f, data)
+        if not (measured == f.measured or (math.isnan(measured) and math.isnan(f.measured))):
+            wrong.append(f"{f.target}: {f.text}: {number(measured)} in the data, not {number(f.measured)}")
+        if holds(f) != f.holds:
+            wrong.append(f"{f.target}: {f.text}: {number(f.measured)} {limits(f)} is {holds(f)}")
+    for target, claimed in record["statuses"].items():
+        supported = status([f for f in findings if f.target == target])
+        if claimed != supported:
+            wrong.append(f"{target}: the findings support '{supported}', not '{claimed}'")
+    return wrong
 
 
 def page(name: str, result: Result) -> str:
     lines = [f"# {result.title}", "", result.method, "", "```", result.command, "```", ""]
-    lines += [f"![{result.title}]({picture})" for picture in result.pictures]
+    lines += [f"![{picture}]({picture}.png)\n" for picture in result.pictures]
     if result.findings:
-        lines += ["", "## Findings", "", "| of | statement | holds |", "|---|---|---|"]
-        lines += [f"| {f.target} | {f.text} | {'yes' if f.holds else '**no**'} |" for f in result.findings]
-    if result.values:
+        lines += ["## Findings", ""]
+        lines += ["`whose`: [T]'s statement, or ours beside it. Only [T]'s count for the status.", ""]
         lines += [
-            "",
-            "## Values",
-            "",
-            "| of | quantity | ours | [T] | ratio | unit |",
-            "|---|---|--:|--:|--:|---|",
+            "| of | statement | whose | what ran | measured | needs | holds |",
+            "|---|---|---|---|--:|---|---|",
         ]
         lines += [
-            f"| {v.target} | {v.what} | {number(v.ours)} | {number(v.printed)} | {number(v.ratio)} | "
-            f"{v.unit} |"
+            f"| {f.target} | {f.text} | {f.claim} | {f.ran} | {number(f.measured)} | {limits(f)} | "
+            f"{'yes' if f.holds else '**no**'} |"
+            for f in result.findings
+        ]
+    if result.values:
+        lines += ["", "## Values", ""]
+        lines += ["Median and 5 to 95 % over the runs; ratio: median over [T]'s.", ""]
+        head = "| of | quantity | what ran | median | 5 to 95 % | runs | [T] | ratio | unit |"
+        lines += [head, "|---|---|---|--:|--:|--:|--:|--:|---|"]
+        lines += [
+            f"| {v.target} | {v.what} | {v.ran} | {number(v.median)} | "
+            f"{'–' if v.low is None else f'{number(v.low)} to {number(v.high)}'} | {v.runs} | "
+            f"{number(v.printed)} | {number(v.ratio)} | {v.unit} |"
             for v in result.values
         ]
-    lines += ["", f"Why they differ: {result.differs}", "", f"All values: [{name}.csv]({name}.csv)", ""]
+    lines += ["", f"Why they differ: {result.differs}", ""]
+    lines += [f"All values: [{name}.csv]({name}.csv); every run: [Parquet](data/{name}.parquet)", ""]
     return "\n".join(lines)
+
+
+def record_of(result: Result) -> dict:
+    targets = sorted({v.target for v in result.values} | {f.target for f in result.findings})
+    return {
+        "title": result.title,
+        "covers": targets,
+        "statuses": {t: status([f for f in result.findings if f.target == t]) for t in targets},
+        "findings": [asdict(f) for f in result.findings],
+    }
 
 
 def write(name: str, result: Result, out_dir: Path) -> None:
@@ -98,52 +291,38 @@ def write(name: str, result: Result, out_dir: Path) -> None:
     (out_dir / f"{name}.md").write_text(page(name, result))
     with (out_dir / f"{name}.csv").open("w", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["target", "quantity", "ours", "printed", "ratio", "unit"])
+        head = (
+            "target quantity filter control world gains fitted median low_5 high_95 runs printed ratio unit"
+        )
+        rows.writerow(head.split())
         for v in result.values:
-            cells = ["" if x is None else f"{x:.6g}" for x in (v.ours, v.printed, v.ratio)]
-            rows.writerow([v.target, v.what, *cells, v.unit])
-    record = {
-        "title": result.title,
-        "covers": sorted({v.target for v in result.values} | {f.target for f in result.findings}),
-        "findings": [asdict(f) for f in result.findings],
-    }
-    (out_dir / f"{name}.json").write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
-
-
-def status(target: str, records: dict[str, dict]) -> tuple[str, str]:
-    """(status, links) of a table or figure, over all experiments that answer for it."""
-    covering = [name for name, record in records.items() if target in record["covers"]]
-    if not covering:
-        return "not done", ""
-    links = ", ".join(f"[{name}]({name}.md)" for name in covering)
-    findings = [f for name in covering for f in records[name]["findings"] if f["target"] == target]
-    if not findings:
-        return "shown", links
-    failed = [f["text"] for f in findings if not f["holds"]]
-    if not failed:
-        return "reproduced", links
-    word = "in part" if len(failed) < len(findings) else "not reproduced"
-    return f"{word}; not so: {'; '.join(failed)}", links
+            shown = (v.median, v.low, v.high, v.runs, v.printed, v.ratio)
+            cells = ["" if x is None else f"{x:.6g}" for x in shown]
+            ran = [v.ran.filter, v.ran.control, v.ran.world, v.ran.gains, v.ran.fitted]
+            rows.writerow([v.target, v.what, *ran, *cells, v.unit])
+    record = json.dumps(record_of(result), indent=1, ensure_ascii=False)
+    (out_dir / f"{name}.json").write_text(record + "\n")
 
 
 def summary(out_dir: Path) -> str:
     """README.md of the folder, from the experiments that have been run into it."""
     records = {file.stem: json.loads(file.read_text()) for file in sorted(out_dir.glob("*.json"))}
-    lines = [
-        "# Experiments",
-        "",
-        "Tables and figures of the dissertation, reproduced by `tools/experiments [NAME... | all]`; "
-        "written by it.",
-        "`reproduced`: every finding stated on the page holds; `shown`: drawn, with nothing to hold it to.",
-        "",
-        "| of [T] | what | status | experiment |",
-        "|---|---|---|---|",
-    ]
+    lines = [*coverage.INTRODUCTION, "", "| status | means |", "|---|---|"]
+    lines += [f"| {word} | {meaning} |" for word, meaning in STATUSES.items()]
+    lines += ["", "| of [T] | what | status | why | experiment |", "|---|---|---|---|---|"]
     targets = dict(coverage.TARGETS)
     for record in records.values():
         for target in record["covers"]:
-            targets.setdefault(target, record["title"])
-    for target, what in targets.items():
-        word, links = status(target, records)
-        lines.append(f"| {target} | {what} | {word} | {links} |")
+            targets.setdefault(target, (record["title"], ""))
+    for target, (what, why) in targets.items():
+        covering = [name for name, record in records.items() if target in record["covers"]]
+        findings = [
+            Finding(**{**f, "ran": Ran(**f["ran"])})
+            for name in covering
+            for f in records[name]["findings"]
+            if f["target"] == target
+        ]
+        links = ", ".join(f"[{name}]({name}.md)" for name in covering) or "none"
+        because = "; ".join(text for text in (why, reason(findings)) if text)
+        lines.append(f"| {target} | {what} | {status(findings)} | {because} | {links} |")
     return "\n".join(lines) + "\n"

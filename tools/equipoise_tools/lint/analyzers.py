@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 
 from .formatting import findings_at, missing
 from .tree import Finding, Tree
@@ -32,6 +33,7 @@ def cppcheck(tree: Tree) -> list[Finding]:
     command = ["cppcheck", "--quiet", "-j2", "--enable=warning,portability,performance", "--inline-suppr"]
     # Its parser gives up on some of C++17, which is no finding about the source.
     command += ["--suppress=internalAstError", "--template={file}:{line}: {message} [{id}]"]
+    command += [f"--library={Path(__file__).with_name('cppcheck.cfg')}"]
     command += ["-Idrivers", "-Iinclude", "-Isrc", "-Iconfig", *names]
     result = subprocess.run(command, cwd=tree.root, capture_output=True, text=True)
     return findings_at(result.stderr)

@@ -24,11 +24,25 @@ ANALYZER = [
 _DIAGNOSTIC = re.compile(r"^(?P<path>/[^:\n]+):(?P<line>\d+):\d+: (?:warning|error): (?P<message>.*)$", re.M)
 
 
+def file_by_file(build: Path) -> list[dict]:
+    """The compile database, with the files of a folder that is compiled as one unit in that unit's place."""
+    entries = []
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        unit = Path(entry["directory"], entry["file"])
+        if unit.parent.name != "Unity":
+            entries.append(entry)
+            continue
+        command = entry.get("arguments") or shlex.split(entry["command"])
+        for _, member, _ in includes(unit.read_text()):
+            arguments = [member if Path(part) == unit else part for part in command]
+            entries.append({"directory": entry["directory"], "file": member, "arguments": arguments})
+    return entries
+
+
 def own_units(tree: Tree, build: Path) -> list[tuple[str, list[str]]]:
     """(file, compile command) of the translation units of src and drivers in the compile database."""
-    database = json.loads((build / "compile_commands.json").read_text())
     units = {}
-    for entry in database:
+    for entry in file_by_file(build):
         path = Path(entry["directory"], entry["file"]).resolve()
         if path.is_relative_to(tree.root):
             name = str(path.relative_to(tree.root))
@@ -68,8 +82,8 @@ def fingerprint(name: str, command: list[str], tree: Tree, settings: bytes) -> s
     return digest.hexdigest()
 
 
-def check_unit(name: str, tree: Tree, build: Path) -> list[Finding]:
-    command = [TOOL, "--quiet", *ANALYZER, "-p", str(build), str(tree.root / name)]
+def check_unit(name: str, tree: Tree, database: Path) -> list[Finding]:
+    command = [TOOL, "--quiet", *ANALYZER, "-p", str(database), str(tree.root / name)]
     result = subprocess.run(command, cwd=tree.root, capture_output=True, text=True)
     findings = []
     for match in _DIAGNOSTIC.finditer(result.stdout):
@@ -89,6 +103,9 @@ def clang_tidy(tree: Tree, build: Path | None = None, jobs: int | None = None) -
         return [Finding(str(build), 0, "has no compile_commands.json; configure first: cmake --preset host")]
     cache = build / "tidy"
     cache.mkdir(exist_ok=True)
+    database = build / "tidy-database"
+    database.mkdir(exist_ok=True)
+    (database / "compile_commands.json").write_text(json.dumps(file_by_file(build)))
     version = subprocess.run([TOOL, "--version"], capture_output=True, check=True).stdout
     settings = (tree.root / ".clang-tidy").read_bytes() + version + " ".join(ANALYZER).encode()
     stamps = {
@@ -99,7 +116,7 @@ def clang_tidy(tree: Tree, build: Path | None = None, jobs: int | None = None) -
         old.unlink()
 
     def check_and_remember(name: str) -> list[Finding]:
-        findings = check_unit(name, tree, build)
+        findings = check_unit(name, tree, database)
         if not findings:
             stamps[name].touch()
         return findings

@@ -1,0 +1,77 @@
+// Two encoders that stand still while the robot moves. One that lies is found by the filters
+// (wheel_isolation.hpp); without two they have nothing left to compare. Wheels of a sound robot stand still
+// together, too, held by stiction, for a second and more: then the body turns by less than 0.05 rad, or, once
+// in 30000 s of sudden commands, by 0.08 rad as one piece with its rolling ball. In: Measurement, the wheel
+// that is not used any more -> out: bits of the wheels. RT-safe.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+template <int Wheels>
+class DeadEncoders {
+ public:
+  void reset() noexcept {
+    known_ = false;
+    for (Pair& pair : pairs_) pair = Pair{};
+    dead_ = 0;
+  }
+
+  /// `lost`: found out already, and stands still for all we know; -1: none.
+  void update(const Measurement<Wheels>& z, int lost) noexcept {
+    if (!z.encoders_ok || z.ticks > 1) {
+      known_ = false;
+      return;
+    }
+    const Vec<Wheels> moved = z.wheel_angle_rad - angle_rad_;
+    angle_rad_ = z.wheel_angle_rad;
+    const bool known = known_;
+    known_ = true;
+    std::size_t at = 0;
+    for (int a = 0; a < Wheels; ++a) {
+      for (int b = a + 1; b < Wheels; ++b, ++at) {
+        Pair& pair = pairs_[at];
+        if (!known || moved(a) != 0.0 || moved(b) != 0.0) {
+          pair = Pair{};
+          continue;
+        }
+        for (std::size_t i = 0; i < 3 && z.imu_ok; ++i) {
+          if (z.gyro_axis_ok[i]) pair.turned_rad[i] += kTickS * z.gyro_B_rad_s(static_cast<int>(i));
+        }
+        pair.others_rad += moved.template lpNorm<1>();
+        const bool one_alone =
+            lost == a || lost == b;  // may stand still where its turning and driving cancel
+        const bool tips = std::hypot(pair.turned_rad[0], pair.turned_rad[1]) > kTips_rad;
+        const bool yaws = std::abs(pair.turned_rad[2]) > (one_alone ? kYawsForOne_rad : kYaws_rad);
+        const bool others = !one_alone && pair.others_rad > kOthers_rad;
+        if (tips || yaws || others) dead_ |= 1U << a | 1U << b;
+      }
+    }
+  }
+
+  std::uint32_t dead() const noexcept { return dead_; }
+
+ private:
+  // Above what 40 sound robots of the population reached, standing, turning, driving, pushed and suddenly
+  // commanded.
+  static constexpr double kTips_rad = 0.12;
+  static constexpr double kYaws_rad = 0.2;
+  static constexpr double kYawsForOne_rad = 2.2;
+  static constexpr double kOthers_rad = 1.0;
+
+  struct Pair {
+    std::array<double, 3> turned_rad{};  // body, since both stand still
+    double others_rad = 0.0;             // way of the other wheels
+  };
+
+  std::array<Pair, static_cast<std::size_t>(Wheels*(Wheels - 1) / 2)> pairs_{};
+  Vec<Wheels> angle_rad_ = Vec<Wheels>::Zero();
+  bool known_ = false;
+  std::uint32_t dead_ = 0;
+};
+
+}  // namespace equipoise

@@ -1,0 +1,317 @@
+// Does the gyro tell the truth? A rate that no torque explains is left out in its tick; where it is the
+// expected one but for a flipped axis or two swapped ones, the gyro lies. What it saw within a few ticks must
+// be what the wheels saw: torque turns body and wheels in a known ratio, and about some axes the wheels give
+// the rate itself. It lies where that agrees with an axis flipped or two swapped and not as it is, and where
+// no single encoder explains what they disagree about. A push agrees with neither; the accelerometer feels
+// it. In: Measurement, rates expected, what the filter knows -> out: the measurement without what lies, and
+// whether the gyro is trusted. Limits: chosen on robots 1 to 8 and 300 to 340 of the population. RT-safe.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+template <int Wheels>
+struct GyroWatchParams {
+  Mat<3, Wheels> from_wheels =
+      Mat<3, Wheels>::Zero();                      // change of body rate per change of wheel rate, by torque
+  Vec3 sigma_rad_s = Vec3::Ones();                 // of what is left of a change over three ticks
+  Vec3 max_step_rad_s = Vec3::Constant(2.0);       // of a rate against what was expected
+  std::array<bool, 3> balances{true, true, true};  // axes without which the robot falls
+  // Axes whose rate is known without a torque: `rate_from_wheels` times the wheels' rates and what the filter
+  // adds.
+  std::array<bool, 3> by_rate{false, false, false};
+  Mat<3, Wheels> rate_from_wheels = Mat<3, Wheels>::Zero();
+  Vec3 rate_sigma_rad_s = Vec3::Constant(0.25);  // encoder counts, play
+};
+
+/// What the filter knows of the tick.
+template <int Wheels>
+struct GyroWitness {
+  double accel_nis = 0.0;  // normalised innovation of the accelerometer's rows, summed
+  // What the wheels' rates change without a torque, because the robot turns and its ball rolls straight on.
+  Vec<Wheels> carried_rad_s2 = Vec<Wheels>::Zero();
+  bool blames_wheel = false;       // one is not used any more
+  bool wheel_stands = false;       // it, since long: that is no fault of the gyro
+  Vec3 rate_rad_s = Vec3::Zero();  // of the axes `by_rate`, added to what the wheels say
+};
+
+template <int Wheels>
+class GyroWatch {
+ public:
+  using Sample = Measurement<Wheels>;
+
+  explicit GyroWatch(const GyroWatchParams<Wheels>& params) : p_(params) {}
+
+  void reset() noexcept {
+    samples_ = 0;
+    impossible_ = 0;
+    away_.fill(0);
+    without_ = 0;
+    settling_ = 0;
+    evidence_ = 0.0;
+    contradicted_ = 0;
+    mirrored_ = 0;
+    listened_ = 0;
+    noise_rad_s_ = 0.0;
+    examined_.fill(true);
+    accel_nis_ = 0.0;
+    trusted_ = true;
+    left_out_ = false;
+    ticks_out_ = 0;
+  }
+
+  /// Leaves out what cannot be; the expected rate stands in.
+  void screen(Sample& z, const Vec3& expected_rad_s) noexcept {
+    left_out_ = false;
+    if (!z.imu_ok) return;
+    listen(z.gyro_B_rad_s);
+    const Vec3 step = z.gyro_B_rad_s - expected_rad_s;
+    mirrored_ = mirrors(believed(z, expected_rad_s), expected_rad_s) ? mirrored_ + 1 : 0;
+    if (mirrored_ >= kMirrored) condemn(nearest_);
+    const int wrong = static_cast<int>((step.array().abs() > p_.max_step_rad_s.array()).count());
+    const bool jolt = std::abs(z.accel_B_m_s2.norm() - kGravity_m_s2) > kMaxJolt_m_s2;
+    impossible_ = (wrong > 1 && mirrored_ == 0) || jolt ? impossible_ + 1 : 0;
+    if (impossible_ > kMaxImpossible) trusted_ = false;
+    if (impossible_ > 0) {
+      z.imu_ok = false;
+      return;
+    }
+    bool needed = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<int>(i);
+      bool& ok = z.gyro_axis_ok[i];
+      int& away = away_[i];
+      away = std::abs(step(axis)) > p_.max_step_rad_s(axis) || away >= kGone ? std::min(away + 1, kGone) : 0;
+      ok = ok && away == 0 && mirrored_ == 0;  // the filter is kept clean of it while it is examined
+      if (ok) continue;
+      z.gyro_B_rad_s(axis) = expected_rad_s(axis);
+      left_out_ = true;
+      needed = needed || p_.balances[i];
+    }
+    ticks_out_ = left_out_ ? ticks_out_ + 1 : 0;
+    without_ = needed ? without_ + 1 : 0;
+    if (without_ > kMaxWithout) trusted_ = false;
+  }
+
+  /// What the gyro says, without axes that are left out, against all wheels, also one that is blamed already:
+  /// should the gyro explain more, it was the wrong one.
+  void compare(const Sample& z, const GyroWitness<Wheels>& witness) noexcept {
+    accel_nis_ += kAccelMean * (std::min(witness.accel_nis, kLargest) - accel_nis_);
+    bool returns = false;  // an axis: what stood in for it is no sample
+    for (std::size_t i = 0; i < 3; ++i) returns = returns || (z.gyro_axis_ok[i] && !examined_[i]);
+    examined_ = z.gyro_axis_ok;
+    if (!z.imu_ok || !z.encoders_ok || z.ticks > 1 || returns) {
+      samples_ = 0;
+      evidence_ = 0.0;
+      contradicted_ = 0;
+      if (z.ticks > kStall) settling_ = kSettling;
+      return;
+    }
+    settling_ = std::max(settling_ - 1, 0);
+    latest_ = latest_ > 0 ? latest_ - 1 : kSpan - 1;
+    gyro_[latest_] = gyro_[latest_ + kSpan] = z.gyro_B_rad_s;
+    angle_[latest_] = angle_[latest_ + kSpan] = z.wheel_angle_rad;
+    samples_ = std::min(samples_ + 1, static_cast<int>(kSpan));
+    const bool examined = samples_ == static_cast<int>(kSpan) && accel_nis_ < kPushed && settling_ == 0;
+    const Verdict verdict = examined ? judge(witness) : Verdict{};
+    evidence_ = verdict.lies ? evidence_ + std::min(verdict.surprise, kMostOfATick) : 0.0;
+    contradicted_ = verdict.unexplained > kContradiction ? contradicted_ + 1 : 0;
+    if (contradicted_ >= kContradicted) trusted_ = false;
+    if (evidence_ > (witness.blames_wheel ? kProofOfAnError : kProof)) condemn(nearest_);
+  }
+
+  bool trusted() const noexcept { return trusted_; }
+  /// For longer than noise of a count or two repeats itself.
+  bool left_out() const noexcept { return ticks_out_ >= kReported; }
+
+ private:
+  static constexpr std::size_t kHalf = 3;  // ticks: what happened in the last three against the three before
+  static constexpr std::size_t kSpan = 2 * kHalf + 1;
+  static constexpr double kSurprise = 60.0;        // squared, in sigmas
+  static constexpr double kMostOfATick = 120.0;    // a tick more is needed, whatever the last one says
+  static constexpr double kProof = 239.0;          // sum over consecutive ticks: two of the most and a little
+  static constexpr double kContradiction = 150.0;  // that no encoder explains; sound robots stay below 80
+  static constexpr int kContradicted = 3;          // ticks
+  static constexpr double kProofOfAnError = 500.0;
+  static constexpr double kExplains = 0.25;  // of the surprise is left with another gyro
+  static constexpr double kScale = 0.05;     // error of a rate by the wheels: radii, rollers
+  static constexpr double kMount = 0.015;    // rad, of the IMU: what an axis sees of the others
+  static constexpr double kOdd_rad_s = 1.0;  // of a rate in a tick; hard pushes: 0.7
+  static constexpr double kMirrors = 0.2;    // of it is left with another gyro
+  static constexpr int kMirrored = 3;        // ticks
+  static constexpr int kMaxImpossible = 3;   // samples in a row
+  static constexpr int kGone = 6;  // an axis that was so wrong for so long is not believed when it slows down
+  static constexpr int kMaxWithout = 4;            // ticks
+  static constexpr int kReported = 5;              // ticks
+  static constexpr double kNoiseMean = 0.05;       // of second differences, 20 ticks
+  static constexpr double kMostNoise_rad_s = 1.0;  // one bad sample of ten stays below 0.42
+  static constexpr double kNoisy_rad_s = 0.6;      // sound robots stay below 0.18
+  static constexpr double kMaxJolt_m_s2 = 3.0 * kGravity_m_s2;
+  static constexpr int kStall = 4;  // ticks: the robot is caught with full torque, and its ball slips
+  static constexpr int kSettling = 20;
+  static constexpr double kAccelMean = 0.2;  // about six ticks
+  static constexpr double kPushed = 10.0;
+  static constexpr double kLargest = 1000.0;
+
+  /// A gyro that lies: axis `i` flipped or, where `k` is another, the two swapped. Swapped axes of a sensor
+  /// that is mounted on its side swap with their signs.
+  struct Lie {
+    int i;
+    int k;
+    double sign;
+    Vec3 operator()(const Vec3& rate) const noexcept {
+      Vec3 r = rate;
+      r(i) = sign * rate(k);
+      r(k) = sign * rate(i);
+      return r;
+    }
+  };
+  static constexpr std::array<Lie, 9> kLies{{{0, 0, -1.0},
+                                             {1, 1, -1.0},
+                                             {2, 2, -1.0},
+                                             {0, 1, 1.0},
+                                             {1, 2, 1.0},
+                                             {2, 0, 1.0},
+                                             {0, 1, -1.0},
+                                             {1, 2, -1.0},
+                                             {2, 0, -1.0}}};
+
+  /// An axis that balances does not lie twice; others can be done without.
+  void condemn(const Lie& lie) noexcept {
+    const auto i = static_cast<std::size_t>(lie.i);
+    const auto k = static_cast<std::size_t>(lie.k);
+    if (p_.balances[i] || p_.balances[k]) trusted_ = false;
+    away_[i] = away_[k] = kGone;
+  }
+
+  /// No robot shakes like that, and none can balance on it.
+  void listen(const Vec3& gyro_rad_s) noexcept {
+    const Vec3 second = gyro_rad_s - 2.0 * heard_[0] + heard_[1];
+    heard_[1] = heard_[0];
+    heard_[0] = gyro_rad_s;
+    listened_ = std::min(listened_ + 1, 3);
+    if (listened_ < 3) return;
+    noise_rad_s_ += kNoiseMean * (std::min(second.cwiseAbs().maxCoeff(), kMostNoise_rad_s) - noise_rad_s_);
+    if (noise_rad_s_ > kNoisy_rad_s) trusted_ = false;
+  }
+
+  Vec3 believed(const Sample& z, const Vec3& expected_rad_s) const noexcept {
+    Vec3 rate = expected_rad_s;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<int>(i);
+      if (z.gyro_axis_ok[i] && away_[i] < kGone) rate(axis) = z.gyro_B_rad_s(axis);
+    }
+    return rate;
+  }
+
+  bool mirrors(const Vec3& gyro_rad_s, const Vec3& expected_rad_s) noexcept {
+    const double as_is = (gyro_rad_s - expected_rad_s).norm();
+    if (!(as_is > kOdd_rad_s)) return false;
+    double least = kLargest;
+    for (const Lie& lie : kLies) {
+      const double left = (lie(gyro_rad_s) - expected_rad_s).norm();
+      if (left < least) nearest_ = lie;
+      least = std::min(least, left);
+    }
+    return least < kMirrors * as_is;
+  }
+
+  /// One wheel's encoder may lie instead: what it says is free then.
+  double with_another_wheel(const Vec3& left) const noexcept {
+    double least = kLargest * kLargest;
+    for (int i = 0; i < Wheels; ++i) {
+      const Vec3 a = p_.from_wheels.col(i).cwiseQuotient(p_.sigma_rad_s);
+      const double share = a.dot(left);
+      least = std::min(least, left.squaredNorm() - share * share / std::max(a.squaredNorm(), 1e-12));
+    }
+    return least;
+  }
+
+  struct Verdict {
+    double surprise = 0.0;     // squared, in sigmas
+    bool lies = false;         // it would be none with a lie taken back
+    double unexplained = 0.0;  // is left of it with any encoder free
+  };
+
+  Verdict judge(const GyroWitness<Wheels>& witness) noexcept {
+    static_assert(kHalf == 3);
+    constexpr double kShare = 1.0 / static_cast<double>(kHalf);
+    const Vec3* const gyro = &gyro_[latest_];
+    const Vec<Wheels>* const angle = &angle_[latest_];
+    const Vec3 mean = kShare * (gyro[0] + gyro[1] + gyro[2]);
+    const Vec3 change = mean - kShare * (gyro[3] + gyro[4] + gyro[5]);
+    constexpr double kHalf_s = static_cast<double>(kHalf) * kTickS;
+    const Vec<Wheels> turned = angle[0] - 2.0 * angle[kHalf] + angle[2 * kHalf];
+    const Vec3 by_wheels = p_.from_wheels * (turned / kHalf_s - kHalf_s * witness.carried_rad_s2);
+    const Vec3 rate = p_.rate_from_wheels * ((angle[0] - angle[kHalf]) / kHalf_s).eval() + witness.rate_rad_s;
+    const auto against = [&](const Vec3& changed, const Vec3& turns) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto axis = static_cast<int>(i);
+        if (!examined_[i]) continue;
+        const double left = p_.by_rate[i] ? turns(axis) - rate(axis) : changed(axis) - by_wheels(axis);
+        const double sigma =
+            p_.by_rate[i] ? p_.rate_sigma_rad_s(axis) + kScale * std::abs(rate(axis)) + kMount * turns.norm()
+                          : p_.sigma_rad_s(axis);
+        sum += left * left / (sigma * sigma);
+      }
+      return sum;
+    };
+    const double as_is = against(change, mean);
+    Verdict verdict;
+    if (!(as_is > kSurprise)) return verdict;
+    double other = kLargest * kLargest;
+    for (const Lie& lie : kLies) {
+      if (!examined_[static_cast<std::size_t>(lie.i)] || !examined_[static_cast<std::size_t>(lie.k)])
+        continue;
+      const double left = against(lie(change), lie(mean));
+      if (left < other) nearest_ = lie;
+      other = std::min(other, left);
+    }
+    Vec3 left = (change - by_wheels).cwiseQuotient(p_.sigma_rad_s);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<int>(i);
+      if (p_.by_rate[i] && p_.rate_from_wheels.row(axis).isZero(0.0))  // no wheel turns about it
+        left(axis) = (mean(axis) - rate(axis)) / p_.rate_sigma_rad_s(axis);
+      if (!examined_[i]) left(axis) = 0.0;
+    }
+    const double wheel = with_another_wheel(left);
+    verdict.surprise = as_is;
+    verdict.lies = other < kExplains * as_is && other < wheel;
+    const bool rightly = witness.wheel_stands || wheel < kExplains * kSurprise;
+    if (witness.blames_wheel && rightly) verdict.lies = false;
+    verdict.unexplained = std::min(as_is, wheel);
+    return verdict;
+  }
+
+  GyroWatchParams<Wheels> p_;
+  // The latest kSpan samples from `latest_` on, latest first; each is written twice, so that none is moved.
+  std::array<Vec3, 2 * kSpan> gyro_{};
+  std::array<Vec<Wheels>, 2 * kSpan> angle_{};
+  std::size_t latest_ = 0;
+  std::array<bool, 3> examined_{true, true, true};  // axes
+  int samples_ = 0;
+  int impossible_ = 0;
+  std::array<int, 3> away_{};  // samples in a row with an impossible rate; kGone: for good
+  int without_ = 0;
+  int settling_ = 0;  // ticks left
+  double evidence_ = 0.0;
+  int contradicted_ = 0;    // ticks in a row
+  int mirrored_ = 0;        // ticks in a row
+  Lie nearest_ = kLies[0];  // that explains most
+  double accel_nis_ = 0.0;
+  std::array<Vec3, 2> heard_{Vec3::Zero(), Vec3::Zero()};  // latest first
+  int listened_ = 0;
+  double noise_rad_s_ = 0.0;
+  bool trusted_ = true;
+  bool left_out_ = false;
+  int ticks_out_ = 0;  // with an axis left out, in a row
+};
+
+}  // namespace equipoise

@@ -1,0 +1,185 @@
+"""Gymnasium environments: a policy in the place of the robot's feedback.
+
+The robot is held, arms and stands up under its own feedback for a second; then every action, a drive of -1 to
+1 per wheel, takes the place of the feedback in the production pipeline: friction compensation, bridge
+inversion and safety are the firmware's. The observation is what the firmware's feedback gets: errors,
+reference minus estimate, and the reference's rates. An action works one tick, 5 ms, after the observation it
+answers, as on a robot whose policy runs beside the loop. An episode ends when the robot falls or its safety
+stops the motors.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core, register_envs
+from ._data import need
+from .simulation import request
+
+need("gymnasium", "gym")
+import gymnasium  # noqa: E402
+from gymnasium.utils.seeding import np_random  # noqa: E402
+from gymnasium.vector import AutoresetMode  # noqa: E402
+from gymnasium.vector.utils import batch_space  # noqa: E402
+
+register_envs()
+
+Array = NDArray[np.float64]
+TICK_HZ = 200
+_LONGEST_S = 360000.0
+_SCALES = {  # errors that cost 1
+    "theta": 0.1,
+    "theta_x": 0.1,
+    "theta_y": 0.1,
+    "phi_dot": 10.0,
+    "phi_dot_x": 10.0,
+    "phi_dot_y": 10.0,
+    "psi_dot": 5.0,
+    "yaw_rate": 5.0,
+}
+_ACTION_COST = 0.05
+
+
+class _Robots:
+    """What both environments share: the simulated robots, spaces, reward."""
+
+    def __init__(
+        self, robot: str | Path, count: int, population: tuple[int, int] | None, asked: dict[str, Any]
+    ):
+        self.request = request(robot, duration_s=_LONGEST_S, **asked)
+        self.episodes = _core.Episodes(self.request, count)
+        self.population = population
+        self.names = self.episodes.observation_names
+        weights = [1.0 / _SCALES[name] if name in _SCALES else 0.0 for name in self.names]
+        self.weights = np.array(weights)
+        self.observations = np.zeros((count, len(self.names)))
+        self.lost = np.zeros(count, bool)
+        # Bounded only by what safety lets pass: an observation outside has ended its episode.
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(self.names),), np.float64)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.episodes.wheels,), np.float64)
+
+    def reset(self, i: int, random: np.random.Generator) -> None:
+        number = None
+        if self.population is not None:
+            number = int(random.integers(self.population[0], self.population[1], endpoint=True))
+        self.episodes.reset(i, int(random.integers(1 << 63)), number)
+        self.episodes.observation(i, self.observations[i])
+
+    def step(self, actions: Array, active: NDArray[np.bool_]) -> Array:
+        """Rewards: 1 for a tick upright, less the squared errors and the drive's."""
+        self.episodes.step(actions, self.observations, self.lost, active)
+        cost = np.square(self.observations * self.weights).sum(axis=1)
+        cost += _ACTION_COST * np.square(actions).sum(axis=1)
+        return np.where(self.lost, 0.0, 1.0 - np.minimum(cost, 1.0))
+
+
+class BalanceEnv(gymnasium.Env[Array, Array]):
+    """One robot."""
+
+    metadata = {"render_modes": [], "render_fps": TICK_HZ}  # noqa: RUF012
+
+    def __init__(
+        self,
+        robot: str | Path = "mbbr",
+        *,
+        yaw_hz: float = 0.0,
+        drive_mps: float = 0.0,
+        fidelity: str = "nominal",
+        population: tuple[int, int] | None = None,
+        set: dict[str, Any] | tuple[str, ...] = (),
+    ) -> None:
+        """population: each episode simulates a robot drawn from these numbers, first to last; with fidelity
+        "full"."""
+        self._robots = _Robots(
+            robot, 1, population, {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set}
+        )
+        self.observation_space = self._robots.observation_space
+        self.action_space = self._robots.action_space
+        self._active = np.ones(1, bool)
+
+    @property
+    def observation_names(self) -> list[str]:
+        return self._robots.names
+
+    @property
+    def truth(self) -> _core.State:
+        """Where the robot really is."""
+        return self._robots.episodes.truth(0)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        super().reset(seed=seed)
+        self._robots.reset(0, self.np_random)
+        return self._robots.observations[0].copy(), {}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        actions = np.clip(np.asarray(action, np.float64), -1.0, 1.0).reshape(1, -1)
+        reward = self._robots.step(actions, self._active)
+        return self._robots.observations[0].copy(), float(reward[0]), bool(self._robots.lost[0]), False, {}
+
+
+class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
+    """Many robots, stepped in one call; one that has ended is reset by the next step (Gymnasium's
+    NEXT_STEP)."""
+
+    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}  # noqa: RUF012
+
+    def __init__(
+        self,
+        robot: str | Path = "mbbr",
+        *,
+        num_envs: int = 1,
+        max_episode_steps: int = 2000,
+        yaw_hz: float = 0.0,
+        drive_mps: float = 0.0,
+        fidelity: str = "nominal",
+        population: tuple[int, int] | None = None,
+        set: dict[str, Any] | tuple[str, ...] = (),
+    ) -> None:
+        self.num_envs = num_envs
+        self._robots = _Robots(
+            robot,
+            num_envs,
+            population,
+            {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
+        )
+        self._limit = max_episode_steps
+        self._steps = np.zeros(num_envs, np.int64)
+        self._ended = np.zeros(num_envs, bool)
+        self._each = range(num_envs)
+        self._random: list[np.random.Generator] = []
+        self.single_observation_space = self._robots.observation_space
+        self.single_action_space = self._robots.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        seeds = seed if isinstance(seed, list) else [None if seed is None else seed + i for i in self._each]
+        for i, one in zip(self._each, seeds, strict=True):
+            if one is not None or i >= len(self._random):
+                self._random[i : i + 1] = [np_random(one)[0]]
+            self._robots.reset(i, self._random[i])
+        self._steps[:] = 0
+        self._ended[:] = False
+        return self._robots.observations.copy(), {}
+
+    def step(
+        self, actions: Array
+    ) -> tuple[Array, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        again = np.flatnonzero(self._ended)
+        actions = np.ascontiguousarray(np.clip(actions, -1.0, 1.0), np.float64)
+        rewards = self._robots.step(actions, ~self._ended)
+        self._steps += 1
+        for i in again:
+            self._robots.reset(int(i), self._random[i])
+            self._steps[i], self._robots.lost[i], rewards[i] = 0, False, 0.0
+        truncated = (self._steps >= self._limit) & ~self._robots.lost
+        self._ended = self._robots.lost | truncated
+        return self._robots.observations.copy(), rewards, self._robots.lost.copy(), truncated, {}

@@ -1,0 +1,46 @@
+// What the command line offers, as data: for shell completion, manual pages and the reference. In: the
+// parser's own options, so that nothing is said twice -> out: a tree of commands. Start-up only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace equipoise::app {
+
+struct OptionDescription {
+  std::vector<std::string> names;    // "-s", "--long"; of a positional: its one name
+  std::string value;                 // FILE, NUMBER, ...; empty: a flag
+  std::vector<std::string> choices;  // all there are; empty: any value
+  std::string range;                 // "-5 to 5"; empty: none
+  std::string standard;              // without the option; empty: not said
+  std::string help;
+  bool positional = false;
+  bool required = false;
+  bool repeats = false;
+};
+
+struct CommandDescription {
+  std::string name;  // "config show": without the program's
+  std::string help;
+  std::string example;
+  std::vector<OptionDescription> options;
+  std::vector<CommandDescription> commands;
+};
+
+/// f(command) for the root and all below, parents first.
+template <class F>
+void for_each_command(const CommandDescription& command, F&& f) {
+  f(command);
+  for (const CommandDescription& below : command.commands) for_each_command(below, f);
+}
+
+/// A script for the shell: bash, zsh or fish.
+std::string completion(const CommandDescription& program, const std::string& shell);
+
+/// Manual page of a command or, of the root, of the program: roff, section 1.
+std::string manual_page(const CommandDescription& command, const std::string& version);
+
+/// All commands in one page, Markdown.
+std::string reference_page(const CommandDescription& program);
+
+}  // namespace equipoise::app

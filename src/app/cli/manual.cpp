@@ -1,0 +1,149 @@
+#include <algorithm>
+#include <sstream>
+
+#include "app/cli/description.hpp"
+
+namespace equipoise::app {
+namespace {
+
+using Command = CommandDescription;
+
+constexpr const char* kAbout =
+    "Keeps a robot upright on a ball (MBBR) or on two wheels (eduMIP): on a BeagleBone, against another "
+    "physics "
+    "engine, or in a simulated world.";
+
+std::string upper(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return text;
+}
+
+std::string dashed(std::string text) {
+  std::replace(text.begin(), text.end(), ' ', '-');
+  return text;
+}
+
+std::string page_name(const Command& c) {
+  return c.name.empty() ? "equipoise" : "equipoise-" + dashed(c.name);
+}
+
+/// Text of a line in roff.
+std::string roff(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '\\')
+      out += "\\e";
+    else if (c == '-')
+      out += "\\-";
+    else
+      out += c;
+  }
+  if (!out.empty() && (out.front() == '.' || out.front() == '\'')) out.insert(0, "\\&");
+  return out;
+}
+
+/// What is known of an option's values, as a sentence or two.
+std::string facts(const OptionDescription& o) {
+  std::string text;
+  const auto add = [&text](const std::string& fact) { text += (text.empty() ? "" : "; ") + fact; };
+  if (o.required) add("required");
+  if (!o.choices.empty()) {
+    std::string names;
+    for (const std::string& name : o.choices) names += (names.empty() ? "" : ", ") + name;
+    add("one of: " + names);
+  }
+  if (!o.range.empty()) add("from " + o.range);
+  if (!o.standard.empty()) add("default: " + o.standard);
+  if (o.repeats) add("may be repeated");
+  return text;
+}
+
+std::string sentence(std::string text) {
+  const bool named = text.substr(0, text.find(' ')).find(':') != std::string::npos;  // "mbbr: ..."
+  if (!text.empty() && !named)
+    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (!text.empty() && text.back() != '.') text += '.';
+  return text;
+}
+
+std::vector<OptionDescription> sorted(const Command& c, bool positional) {
+  std::vector<OptionDescription> chosen;
+  for (const OptionDescription& o : c.options)
+    if (o.positional == positional) chosen.push_back(o);
+  return chosen;
+}
+
+void roff_options(std::ostringstream& out, const Command& c) {
+  for (const bool positional : {true, false}) {
+    const auto options = sorted(c, positional);
+    if (options.empty()) continue;
+    out << ".SH " << (positional ? "ARGUMENTS" : "OPTIONS") << "\n";
+    for (const OptionDescription& o : options) {
+      out << ".TP\n";
+      for (const std::string& name : o.names)
+        out << (&name == o.names.data() ? "" : ", ") << "\\fB" << roff(name) << "\\fR";
+      if (!o.value.empty() && !positional) out << " \\fI" << roff(o.value) << "\\fR";
+      out << "\n" << roff(sentence(o.help.empty() ? o.value : o.help)) << "\n";
+      if (const std::string known = facts(o); !known.empty()) out << roff(sentence(known)) << "\n";
+    }
+  }
+}
+
+}  // namespace
+
+std::string manual_page(const Command& c, const std::string& version) {
+  std::ostringstream out;
+  const std::string title = c.name.empty() ? "firmware and simulator of balancing robots" : c.help;
+  out << ".TH " << roff(upper(page_name(c))) << " 1 \"\" \"equipoise " << version << "\" \"User Commands\"\n"
+      << ".SH NAME\n"
+      << roff(page_name(c)) << " \\- " << roff(title) << "\n.SH SYNOPSIS\n.B equipoise"
+      << (c.name.empty() ? "" : " " + roff(c.name)) << "\n"
+      << (c.commands.empty() ? "" : ".I command\n") << ".RI [ options ]\n";
+  for (const OptionDescription& o : sorted(c, true)) out << ".I " << roff(o.names.front()) << "\n";
+  out << ".SH DESCRIPTION\n" << roff(c.name.empty() ? kAbout : sentence(c.help)) << "\n";
+  roff_options(out, c);
+  if (!c.commands.empty()) {
+    out << ".SH COMMANDS\n";
+    for (const Command& below : c.commands)
+      out << ".TP\n.BR " << roff(page_name(below)) << " (1)\n" << roff(sentence(below.help)) << "\n";
+  }
+  if (!c.example.empty()) out << ".SH EXAMPLE\n.nf\n" << roff(c.example) << "\n.fi\n";
+  out << ".SH EXIT STATUS\n0 success, 1 a job that failed, 2 bad usage or input.\n";
+  if (c.name.empty()) {
+    out << ".SH FILES\n.TP\n.I /etc/default/equipoise\nWhat the service flies.\n"
+           ".TP\n.I /etc/equipoise\nRobot configurations and board files.\n";
+  } else {
+    out << ".SH SEE ALSO\n.BR equipoise (1)\n";
+  }
+  return out.str();
+}
+
+std::string reference_page(const Command& program) {
+  std::ostringstream out;
+  out << "# Commands\n`equipoise COMMAND --help` says the same. Exit status: 0 success, 1 a job that failed, "
+         "2 bad usage "
+         "or input.\n";
+  const auto cell = [](std::string text) {
+    for (std::size_t at = 0; (at = text.find_first_of("|<", at)) != std::string::npos; at += 2)
+      text.insert(at, "\\");
+    return text;
+  };
+  for_each_command(program, [&](const Command& c) {
+    if (c.name.empty()) return;
+    out << "\n## equipoise " << c.name << "\n" << sentence(c.help) << "\n";
+    if (!c.example.empty()) out << "\n```sh\n" << c.example << "\n```\n";
+    if (c.options.size() > 1 || c.commands.empty()) out << "\n| option | what |\n|---|---|\n";
+    for (const OptionDescription& o : c.options) {
+      if (c.options.size() == 1 && !c.commands.empty()) break;
+      std::string names;
+      for (const std::string& name : o.names) names += (names.empty() ? "" : "`, `") + name;
+      if (!o.value.empty() && !o.positional) names += " " + o.value;
+      const std::string known = facts(o);
+      out << "| `" << names << "` | " << cell(sentence(o.help))
+          << (known.empty() ? "" : " " + cell(sentence(known))) << " |\n";
+    }
+  });
+  return out.str();
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,7 @@
+#include "app/cli/version.hpp"
+
+namespace equipoise::app {
+
+std::string version() { return EQUIPOISE_VERSION; }
+
+}  // namespace equipoise::app

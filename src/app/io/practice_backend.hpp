@@ -1,0 +1,82 @@
+// A simulated backend to practise on: its ticks come in wall-clock time, or at a multiple of it, and what is
+// to break breaks on time. In: a backend in simulated time, speed, planned faults -> out: another backend.
+// Simulation only.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "app/cli/errors.hpp"
+#include "app/io/fault_backend.hpp"
+#include "equipoise/runtime/monotonic.hpp"
+#include "equipoise/types.hpp"
+
+namespace equipoise::app {
+
+struct PlannedFault {
+  FaultKind kind = FaultKind::kImuOff;
+  double at_s = 0.0;
+  int ticks = 0;
+};
+
+/// "NAME@T" until the end, or "NAME@T+D" for D seconds; InputError says what is wrong.
+PlannedFault planned_fault(const std::string& text);
+
+class PracticeBackend {
+ public:
+  /// `speed`: simulated seconds in one of the wall clock.
+  PracticeBackend(rio_t simulated, double speed, std::vector<PlannedFault> faults, std::uint64_t seed)
+      : broken_(simulated, seed), inner_(broken_.io()), speed_(speed), faults_(std::move(faults)) {
+    std::sort(faults_.begin(), faults_.end(),
+              [](const PlannedFault& a, const PlannedFault& b) { return a.at_s < b.at_s; });
+  }
+
+  rio_t io() noexcept {
+    static const rio_ops_t ops{wait_tick, read_sensors, write_motors, motors_off, close};
+    return {&ops, this};
+  }
+  /// A log that cannot be written is a fault outside the boundary.
+  bool breaks_log() const noexcept {
+    return std::any_of(faults_.begin(), faults_.end(),
+                       [](const PlannedFault& f) { return f.kind == FaultKind::kLogFull; });
+  }
+  const std::atomic<bool>& log_failed() const noexcept { return broken_.log_failed(); }
+
+ private:
+  static PracticeBackend& self(void* p) noexcept { return *static_cast<PracticeBackend*>(p); }
+
+  static int wait_tick(void* p, std::int64_t* now_ns) {
+    PracticeBackend& b = self(p);
+    for (; b.next_ < b.faults_.size() && b.faults_[b.next_].at_s <= b.time_s_; ++b.next_)
+      b.broken_.start(b.faults_[b.next_].kind, b.faults_[b.next_].ticks);
+    const int status = rio_wait_tick(&b.inner_, now_ns);
+    if (status == 0) b.keep_pace(*now_ns);
+    return status;
+  }
+  static int read_sensors(void* p, rio_sensors_t* out) { return rio_read_sensors(&self(p).inner_, out); }
+  static int write_motors(void* p, const rio_motors_t* motors) {
+    return rio_write_motors(&self(p).inner_, motors);
+  }
+  static int motors_off(void* p) { return rio_motors_off(&self(p).inner_); }
+  static void close(void* p) { rio_close(&self(p).inner_); }
+
+  void keep_pace(std::int64_t simulated_ns) {
+    constexpr std::int64_t kLost_ns = 200'000'000;  // a laptop that slept does not catch up
+    time_s_ = static_cast<double>(simulated_ns) * 1e-9;
+    const auto due_in = static_cast<std::int64_t>(static_cast<double>(simulated_ns) / speed_);
+    const std::int64_t now_ns = runtime::monotonic_now_ns();
+    if (start_ns_ == 0 || now_ns > start_ns_ + due_in + kLost_ns) start_ns_ = now_ns - due_in;
+    runtime::sleep_until(start_ns_ + due_in);
+  }
+
+  FaultBackend broken_;
+  rio_t inner_;
+  double speed_;
+  std::vector<PlannedFault> faults_;
+  std::size_t next_ = 0;
+  double time_s_ = 0.0;
+  std::int64_t start_ns_ = 0;
+};
+
+}  // namespace equipoise::app

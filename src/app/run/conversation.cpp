@@ -1,0 +1,121 @@
+#include "app/run/conversation.hpp"
+
+#include "app/cli/interrupt.hpp"
+#include "app/cli/key_file.hpp"
+#include "app/run/wires.hpp"
+
+namespace equipoise::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+Clock::time_point after(double seconds) {
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+}  // namespace
+
+Conversation::Conversation(const SendArguments& a, const runtime::CommandKeys& keys)
+    : a_(a),
+      sender_(as_input([&] { return runtime::CommandSender(keys, a.robot, a.holder); })),
+      robot_(a.robot.empty() ? keys.robot() : a.robot),
+      wire_(open_wire(a.url, runtime::WireSide::kOwner)) {}
+
+void Conversation::listen(double seconds) {
+  constexpr int kPatience_ms = 10;
+  const auto end = after(seconds);
+  do {
+    wire_->listen(kPatience_ms, [this](const std::uint8_t* data, std::size_t size) {
+      command_session_t heard;
+      const auto length = static_cast<int>(size);
+      if (heard.decode(data, 0, length) == length) sender_.hear(heard);
+    });
+    while (const auto question = sender_.ask()) say(*question);
+  } while (Clock::now() < end && !interrupted.load());
+}
+
+/// And a while longer: a second one of the same name and key must not go unnoticed.
+void Conversation::find_robots() {
+  for (const auto limit = after(a_.timeout_s); sender_.links().empty(); listen(0.0)) {
+    if (Clock::now() < limit && !interrupted.load()) continue;
+    if (sender_.deaf())
+      throw std::runtime_error("a robot is heard on " + a_.url +
+                               ", but it has not the same key; has that been rotated?");
+    fail("is not heard on " + a_.url + " (it needs equipoise run --command-key FILE)");
+  }
+  if (a_.disarm) return;  // at once
+  listen(kOthers_s);
+  if (sender_.links().size() > 1)
+    throw std::runtime_error("two robots with this key answer as " + robot_ +
+                             ": give each its own (equipoise run --robot-name, or keygen)");
+}
+
+/// One arm, disarm or heading reset of the turn that is now, repeated until the robot has begun the next.
+/// False: somebody else was faster.
+bool Conversation::begin_turn(Link* link, std::int8_t action) {
+  const std::int64_t turn = link->turn;
+  const std::int64_t first = link->signed_up_to + 1;
+  for (const auto limit = after(a_.timeout_s); link->turn == turn;) {
+    if (Clock::now() > limit || interrupted.load()) fail("confirms nothing");
+    say(sender_.sign(link, turn, action));
+    for (const auto next = after(wire_->interval_s()); Clock::now() < next && link->turn == turn;)
+      listen(0.0);
+  }
+  return sender_.began_turn(*link, first);
+}
+
+void Conversation::begin_turn(std::int8_t action, const char* what) {
+  if (!begin_turn(&robot(), action)) fail("did not " + std::string(what) + ": " + overtaken(robot()));
+}
+
+void Conversation::wait_until_armed() {
+  const std::int64_t turn = robot().turn;
+  for (const auto limit = after(a_.timeout_s); robot().state != command_session_t::ARMED; listen(0.0)) {
+    if (robot().turn != turn) fail("did not arm: " + overtaken(robot()));
+    if (robot().state != command_session_t::WAITING || Clock::now() > limit)
+      fail("does not arm; its log, its LEDs and equipoise doctor say why");
+  }
+}
+
+/// Whoever disarms wants it off: an arm in between is answered by the next disarm. Of two robots with one
+/// name and key, both.
+void Conversation::disarm_all() {
+  const auto others = after(kOthers_s);
+  const auto limit = after(a_.timeout_s);
+  for (std::size_t i = 0; i < sender_.links().size() || Clock::now() < others;) {
+    if (i == sender_.links().size()) {
+      listen(0.0);
+      continue;
+    }
+    const bool ours = begin_turn(&sender_.links()[i], signed_command_t::DISARM);
+    while (ours && sender_.links()[i].state == command_session_t::WAITING && Clock::now() < limit)
+      listen(0.0);
+    if (sender_.links()[i].state == command_session_t::OFF) {
+      ++i;
+    } else if (Clock::now() > limit) {
+      fail("has taken the disarm, but its motors are not off");
+    }
+  }
+}
+
+std::int64_t Conversation::drive() {
+  const std::int64_t turn = robot().turn;
+  const runtime::CommandSender::Motion motion{{a_.drive_mps, a_.sideways_mps}, 2.0 * kPi * a_.yaw_hz};
+  const auto end = after(a_.duration_s);
+  auto silent = after(a_.timeout_s);
+  for (std::int64_t sent = 1;; ++sent) {
+    const std::int64_t confirmed = robot().confirmed;
+    say(sender_.sign(&robot(), turn, signed_command_t::DRIVE, motion));
+    listen(wire_->interval_s());
+    const bool last = Clock::now() >= end || interrupted.load();
+    for (const auto limit = after(kAnswer_s); last && confirms_more(); listen(0.0)) {
+      if (Clock::now() > limit) break;  // one was lost: say it again
+    }
+    if (robot().turn != turn) fail("drives no more as told: " + overtaken(robot()));
+    if (robot().confirmed > confirmed) silent = after(a_.timeout_s);
+    if (last && !confirms_more()) return sent;
+    if (Clock::now() > silent) fail("took none or not all of " + std::to_string(sent) + " commands");
+  }
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,46 @@
+#include "python/simulated.hpp"
+
+namespace equipoise::python {
+namespace {
+
+struct MbbrAccess {
+  using Reference = MbbrReference;
+
+  static std::vector<std::string> error_names() {
+    return {"theta_x", "theta_y",   "theta_dot_x", "theta_dot_y", "phi_x",
+            "phi_y",   "phi_dot_x", "phi_dot_y",   "theta_z",     "yaw_rate"};
+  }
+  static std::vector<std::string> reference_names() {
+    return {"reference_phi_dot_x", "reference_phi_dot_y", "reference_yaw_rate"};
+  }
+  static Eigen::VectorXd error(const MbbrReference& r) {
+    Eigen::VectorXd e(10);
+    e << r.d_theta, r.d_rate, r.d_phi, r.d_phi_dot, r.d_theta_z, r.d_yaw_rate;
+    return e;
+  }
+  static Eigen::VectorXd wanted(const MbbrReference& r) {
+    Eigen::VectorXd w(3);
+    w << r.phi_dot_star, r.yaw_rate;
+    return w;
+  }
+  static MbbrEstimate estimate(const StateView& v, const MbbrParameters&) {
+    MbbrEstimate x;
+    x.theta_xy = v.theta_rad.head<2>();
+    x.theta_z = v.theta_rad.z();
+    x.omega_B = v.omega_B_rad_s;
+    x.theta_dot = euler_rates(x.theta_xy, x.omega_B);
+    x.phi_dot_star = v.phi_dot_rad_s;
+    x.phi = v.phi_rad;
+    x.normalized_innovation = v.normalized_innovation;
+    return x;
+  }
+};
+
+}  // namespace
+
+const Simulated& simulated_as(MbbrFirmware) {
+  static const SimulatedOf<MbbrFirmware, MbbrAccess> robot;
+  return robot;
+}
+
+}  // namespace equipoise::python

@@ -1,0 +1,40 @@
+#include "python/simulated.hpp"
+
+namespace equipoise::python {
+namespace {
+
+struct MipAccess {
+  using Reference = MipReference;
+
+  static std::vector<std::string> error_names() {
+    return {"theta", "theta_dot", "phi", "phi_dot", "psi", "psi_dot"};
+  }
+  static std::vector<std::string> reference_names() { return {"reference_phi_dot", "reference_psi_dot"}; }
+  static Eigen::VectorXd error(const MipReference& r) {
+    Eigen::VectorXd e(6);
+    e << r.d_theta, r.d_theta_dot, r.d_phi, r.d_phi_dot, r.d_psi, r.d_psi_dot;
+    return e;
+  }
+  static Eigen::VectorXd wanted(const MipReference& r) { return Vec2(r.phi_dot, r.psi_dot); }
+  static MipEstimate estimate(const StateView& v, const MipParameters&) {
+    MipEstimate x;
+    x.theta = v.theta_rad.x();
+    x.phi = v.phi_rad.x();
+    x.psi = v.theta_rad.z();
+    x.theta_dot = v.omega_B_rad_s.x();
+    x.phi_dot = v.phi_dot_rad_s.x();
+    x.psi_dot = v.omega_B_rad_s.z() / std::cos(x.theta);
+    x.position_W_m = v.position_W_m;
+    x.normalized_innovation = v.normalized_innovation;
+    return x;
+  }
+};
+
+}  // namespace
+
+const Simulated& simulated_as(MipFirmware) {
+  static const SimulatedOf<MipFirmware, MipAccess> robot;
+  return robot;
+}
+
+}  // namespace equipoise::python

@@ -1,0 +1,163 @@
+// The body of Simulated for one robot. In: Firmware, and Access, which says its errors as a vector and its
+// estimate from the robot-neutral state -> out: SimulatedOf. Included by robot_*.cpp only.
+#pragma once
+
+#include "app/sim/hooks.hpp"
+#include "app/sim/simulated_run.hpp"
+#include "equipoise/sense/calibrate.hpp"
+#include "python/simulation.hpp"
+
+namespace equipoise::python {
+
+template <class Firmware, class Access>
+class SimulatedOf : public Simulated {
+ public:
+  using Robot = typename Firmware::Robot;
+  using World = typename Firmware::World;
+  using Config = typename Firmware::Config;
+  using Input = Vec<Robot::kInputs>;
+  using Reference = typename Access::Reference;
+
+  int wheels() const override { return Robot::kWheels; }
+  int inputs() const override { return Robot::kInputs; }
+  std::vector<std::string> error_names() const override { return Access::error_names(); }
+  std::vector<std::string> observation_names() const override {
+    std::vector<std::string> names = Access::error_names();
+    for (const std::string& name : Access::reference_names()) names.push_back(name);
+    return names;
+  }
+  std::vector<std::string> estimators() const override { return Firmware::estimators(); }
+  std::vector<std::string> controllers() const override { return Firmware::controllers(); }
+
+  nlohmann::json run(app::SimRequest request, const Hooks& hooks, Recorder* recorder,
+                     const app::TickObserver& observe, const std::atomic<bool>& stop) const override {
+    const auto loaded = app::load_for<Firmware>(&request);
+    const auto options = app::options_for<Firmware>(request, loaded.config);
+    const app::TickObserver record = [&](const runtime::TickRecord& tick) {
+      recorder->add(tick);
+      observe(tick);
+    };
+    const app::TickObserver& each = recorder != nullptr ? record : observe;
+    const app::SimSummary summary =
+        hooks.any() ? hooked_run(loaded.config, request.choice, options, hooks, each, stop)
+                    : app::simulate<Firmware>(loaded.config, request.choice, options, each, stop);
+    nlohmann::json out = app::to_json<Firmware>(request, summary, loaded.sha256);
+    out["config_toml"] = loaded.toml;
+    return out;
+  }
+
+  std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const override {
+    const auto loaded = app::load_for<Firmware>(&request);
+    const Config config = Firmware::apply(loaded.config, request.choice);
+    return [request, config](std::uint64_t seed) mutable {
+      request.seed = seed;
+      return Firmware::with_pipeline(config, request.choice.controller, [&](auto& own) {
+        using Own = std::decay_t<decltype(own)>;
+        return std::unique_ptr<Episode>(std::make_unique<EpisodeOf<Own>>(config, request, own.params()));
+      });
+    };
+  }
+
+  void calibrate(const std::string& toml, const std::vector<RawSample>& raw, double* out) const override {
+    const Calibration calibration = Firmware::parse(toml, "the log").config.calibration;
+    for (const RawSample& sample : raw) {
+      const auto z = equipoise::calibrate<Robot::kWheels>(sample, calibration);
+      for (const Vec3& v : {z.gyro_B_rad_s, z.accel_B_m_s2, z.attitude_rad}) {
+        for (int i = 0; i < 3; ++i) *out++ = v(i);
+      }
+      *out++ = z.battery_V;
+      for (int i = 0; i < Robot::kWheels; ++i) *out++ = z.wheel_angle_rad(i);
+    }
+  }
+
+ private:
+  /// What is handed on as it was is not rounded on the way.
+  static bool same(const StateView& a, const StateView& b) {
+    return a.theta_rad == b.theta_rad && a.omega_B_rad_s == b.omega_B_rad_s && a.phi_rad == b.phi_rad &&
+           a.phi_dot_rad_s == b.phi_dot_rad_s && a.position_W_m == b.position_W_m &&
+           a.normalized_innovation == b.normalized_innovation;
+  }
+
+  static app::SimSummary hooked_run(const Config& configured, const app::Choice& choice,
+                                    const app::SimOptions& options, const Hooks& hooks,
+                                    const app::TickObserver& observe, const std::atomic<bool>& stop) {
+    const Config config = Firmware::apply(configured, choice);
+    World world = Firmware::world(config, fidelity_level(choice.fidelity), options.seed);
+    return Firmware::with_pipeline(config, choice.controller, [&](auto& own) {
+      using Own = std::decay_t<decltype(own)>;
+      using Pipeline = app::Hooked<Own>;
+      const Pipeline* flying = nullptr;
+      app::FeedbackHook<Robot, Reference> feedback;
+      if (hooks.controller) {
+        feedback = [&](const Reference& reference, const Input& u_own) -> Input {
+          return hooks.controller({world.time_s(), view(flying->estimators().controlling(), config.robot),
+                                   view(reference, config.robot), Access::error(reference), u_own});
+        };
+      }
+      Pipeline pipeline(app::hooked<Own>(own.params(), feedback));
+      flying = &pipeline;
+      if (hooks.estimator) {
+        pipeline.estimators().replace([&](const typename Robot::Sample& z, const Input& u, bool held,
+                                          const typename Robot::Estimate& own_estimate) {
+          const StateView own_view = view(own_estimate, config.robot);
+          const StateView x = hooks.estimator({world.time_s(), held, z.gyro_B_rad_s, z.accel_B_m_s2,
+                                               z.attitude_rad, z.imu_ok, z.encoders_ok, z.attitude_ok,
+                                               z.wheel_angle_rad, z.wheel_rate_rad_s, u, own_view});
+          return same(x, own_view) ? own_estimate : Access::estimate(x, config.robot);
+        });
+      }
+      return app::SimulatedRun<Firmware, World, Pipeline>(world, pipeline, Firmware::rolling_radius_m(config),
+                                                          options, observe, stop)
+          .run();
+    });
+  }
+
+  /// Stands up under its own feedback; from then on the action takes its place.
+  template <class Own>
+  class EpisodeOf : public Episode {
+   public:
+    EpisodeOf(const Config& config, const app::SimRequest& request, const typename Own::Params& params)
+        : kinematics_(config.robot),
+          robot_(config.robot),
+          world_(Firmware::world(config, fidelity_level(request.choice.fidelity), request.seed)),
+          pipeline_(app::hooked<Own>(params,
+                                     [this](const Reference& r, const Input& own) -> Input {
+                                       reference_ = r;
+                                       return acts_ ? u_ : own;
+                                     })),
+          run_(world_, pipeline_, Firmware::rolling_radius_m(config),
+               app::options_for<Firmware>(request, config), observe_, stop_) {
+      while (world_.time_s() < app::kDriveFrom_s && run_.step()) {
+      }
+      acts_ = true;
+    }
+
+    bool step(const double* wheels) override {
+      Vec<Robot::kWheels> drive;
+      for (int i = 0; i < Robot::kWheels; ++i) drive(i) = wheels[i];
+      u_ = kinematics_.axes_from_wheels(drive);
+      return run_.step();
+    }
+    void observation(double* out) const override {
+      const Eigen::VectorXd error = Access::error(reference_);
+      const Eigen::VectorXd wanted = Access::wanted(reference_);
+      out = std::copy(error.begin(), error.end(), out);
+      std::copy(wanted.begin(), wanted.end(), out);
+    }
+    StateView truth() const override { return view(world_.truth(), robot_); }
+
+   private:
+    typename Robot::Kinematics kinematics_;
+    typename Robot::Parameters robot_;
+    World world_;
+    Reference reference_{};
+    Input u_ = Input::Zero();
+    bool acts_ = false;
+    app::Hooked<Own> pipeline_;
+    app::TickObserver observe_;
+    std::atomic<bool> stop_{false};
+    app::SimulatedRun<Firmware, World, app::Hooked<Own>> run_;
+  };
+};
+
+}  // namespace equipoise::python

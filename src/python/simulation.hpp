@@ -1,0 +1,83 @@
+// What the Python package asks of the core, without Python: runs with hooks, recorded runs, episodes that are
+// stepped from outside, calibrated sensors. In: request, functions -> out: figures as JSON, columns, numbers.
+// Each robot is compiled once (robot_*.cpp). Simulation only.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app/sim/sim_job.hpp"
+#include "python/recorder.hpp"
+
+namespace equipoise::python {
+
+/// What a controller is told, before it says u about the input axes.
+struct ControllerTick {
+  double t_s = 0.0;
+  StateView estimate;
+  StateView reference;
+  Eigen::VectorXd error;  // reference minus estimate, in the order of Simulated::kErrorNames
+  Eigen::VectorXd u_own;  // of the robot's feedback
+};
+
+/// What an estimator is told, before it says where the robot is.
+struct EstimatorTick {
+  double t_s = 0.0;
+  bool held = false;  // motors off: the robot is not balancing
+  Vec3 gyro_B_rad_s, accel_B_m_s2, attitude_rad;
+  bool imu_ok = false, encoders_ok = false, attitude_ok = false;
+  Eigen::VectorXd wheel_angle_rad, wheel_rate_rad_s;
+  Eigen::VectorXd u;  // as applied since the last tick, about the input axes
+  StateView own;      // what the robot's estimator says
+};
+
+struct Hooks {
+  std::function<Eigen::VectorXd(const ControllerTick&)> controller;
+  std::function<StateView(const EstimatorTick&)> estimator;
+  bool any() const { return controller || estimator; }
+};
+
+/// A robot that stands and waits for the next action.
+class Episode {
+ public:
+  Episode() = default;
+  Episode(const Episode&) = delete;
+  Episode& operator=(const Episode&) = delete;
+  virtual ~Episode() = default;
+  /// One tick with the motors driven by `wheels`, -1 to 1 each; false when the robot is lost.
+  virtual bool step(const double* wheels) = 0;
+  virtual void observation(double* out) const = 0;
+  virtual StateView truth() const = 0;
+};
+
+/// One robot for all configurations of it.
+class Simulated {
+ public:
+  Simulated() = default;
+  Simulated(const Simulated&) = delete;
+  Simulated& operator=(const Simulated&) = delete;
+  virtual ~Simulated() = default;
+
+  virtual int wheels() const = 0;
+  virtual int inputs() const = 0;
+  virtual std::vector<std::string> error_names() const = 0;
+  virtual std::vector<std::string> observation_names() const = 0;
+  virtual std::vector<std::string> estimators() const = 0;
+  virtual std::vector<std::string> controllers() const = 0;
+  /// `recorder` may be nullptr.
+  virtual nlohmann::json run(app::SimRequest request, const Hooks& hooks, Recorder* recorder,
+                             const app::TickObserver& observe, const std::atomic<bool>& stop) const = 0;
+  /// f(seed): configured once, as many episodes as are wanted.
+  virtual std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const = 0;
+  /// Row by row: gyro, accelerometer, attitude (3 each), battery, wheel angles. `toml`: of the run's log.
+  virtual void calibrate(const std::string& toml, const std::vector<RawSample>& raw, double* out) const = 0;
+};
+
+const Simulated& simulated_as(MbbrFirmware robot);
+const Simulated& simulated_as(MipFirmware robot);
+/// By robot.type of a configuration.
+const Simulated& simulated(const std::string& type);
+
+}  // namespace equipoise::python

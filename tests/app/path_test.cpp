@@ -1,0 +1,130 @@
+#include "app/run/path.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+
+#include "app/cli/errors.hpp"
+
+namespace equipoise::app {
+namespace {
+
+constexpr PathLimits kAnything{10.0, 100.0, 100.0};
+constexpr double kSpeed_m_s = 0.1;
+
+std::string waypoint_file(const std::string& text) {
+  const std::string name = testing::TempDir() + "waypoints.txt";
+  std::ofstream(name) << text;
+  return name;
+}
+
+std::string refusal(const std::string& name, const PathLimits& limits) {
+  try {
+    (void)make_path(name, kSpeed_m_s, limits);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+class NamedPath : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(All, NamedPath, testing::Values("circle", "figure8", "square", "waltz"));
+
+TEST_P(NamedPath, BeginsAtRestAlongXAndNeverExceedsItsSpeed) {
+  const auto path = make_path(GetParam(), kSpeed_m_s, kAnything);
+  EXPECT_EQ(path->at(0.0).velocity_W_m_s.norm(), 0.0);
+  EXPECT_EQ(path->at(0.0).position_W_m.norm(), 0.0);
+  const Vec2 soon = path->at(0.1).velocity_W_m_s.normalized();
+  EXPECT_NEAR(soon.x(), 1.0, 1e-3);
+  double fastest = 0.0;
+  for (double t = 0.0; t < 120.0; t += 0.01) fastest = std::max(fastest, path->at(t).velocity_W_m_s.norm());
+  EXPECT_NEAR(fastest, kSpeed_m_s, 1e-6);
+}
+
+TEST_P(NamedPath, VelocityAndYawRateAreTheDerivatives) {
+  const auto path = make_path(GetParam(), kSpeed_m_s, kAnything);
+  constexpr double h = 1e-4;
+  for (double t = h; t < 120.0; t += 0.173) {
+    const PathPoint before = path->at(t - h);
+    const PathPoint after = path->at(t + h);
+    const PathPoint at = path->at(t);
+    EXPECT_LT(((after.position_W_m - before.position_W_m) / (2.0 * h) - at.velocity_W_m_s).norm(), 1e-5) << t;
+    EXPECT_NEAR((after.yaw_rad - before.yaw_rad) / (2.0 * h), at.yaw_rate_rad_s, 1e-5) << t;
+  }
+}
+
+TEST_P(NamedPath, ComesBackToItsStart) {
+  const auto path = make_path(GetParam(), kSpeed_m_s, kAnything);
+  double nearest = 1.0;
+  for (double t = 10.0; t < 60.0; t += 0.005) nearest = std::min(nearest, path->at(t).position_W_m.norm());
+  EXPECT_LT(nearest, 1e-3);
+}
+
+TEST_P(NamedPath, ARobotThatMovesAlongItsNoseFollowsIt) {
+  const auto path = make_path(GetParam(), kSpeed_m_s, kAnything);
+  Vec2 position = Vec2::Zero();
+  double heading = 0.0;
+  for (int tick = 0; tick < 60 * 200; ++tick) {
+    const double t = tick * kTickS;
+    const PathPoint point = along_its_nose(*path, t);
+    const double turn = point.yaw_rate_rad_s * kTickS;
+    position += kTickS * rotate(heading + 0.5 * turn, point.velocity_W_m_s);
+    heading += turn;
+    ASSERT_LT((position - path->at(t + kTickS).position_W_m).norm(), 2e-3) << t;
+  }
+}
+
+TEST(WaypointPath, IsTheClampedCubicSpline) {
+  // 3 t^2 - 2 t^3 is at rest at 0 and 1: a clamped spline through its points is the cubic itself.
+  const auto cubic = [](double t) { return t * t * (3.0 - 2.0 * t); };
+  std::string text = "# time x y yaw\n";
+  for (const double t : {0.0, 0.2, 0.35, 0.7, 1.0}) {
+    char line[120];
+    std::snprintf(line, sizeof line, "%.17g, %.17g, %.17g, %.17g\n", t, 1.0 + cubic(t), -2.0 * cubic(t),
+                  0.5 * cubic(t));
+    text += line;
+  }
+  const auto path = make_path(waypoint_file(text), kSpeed_m_s, kAnything);
+  for (double t = 0.0; t <= 1.0; t += 0.01) {
+    const PathPoint point = path->at(t);
+    EXPECT_NEAR(point.position_W_m.x(), cubic(t), 1e-12);
+    EXPECT_NEAR(point.position_W_m.y(), -2.0 * cubic(t), 1e-12);
+    EXPECT_NEAR(point.yaw_rad, 0.5 * cubic(t), 1e-12);
+    EXPECT_NEAR(point.velocity_W_m_s.x(), 6.0 * t * (1.0 - t), 1e-11);
+  }
+  const PathPoint after = path->at(3.0);
+  EXPECT_NEAR(after.position_W_m.x(), 1.0, 1e-12);
+  EXPECT_EQ(after.velocity_W_m_s.norm(), 0.0);
+}
+
+TEST(WaypointPath, TwoPointsAreEnough) {
+  const auto path = make_path(waypoint_file("0 0 0 0\n4 1 0 0\n"), kSpeed_m_s, kAnything);
+  EXPECT_NEAR(path->at(2.0).position_W_m.x(), 0.5, 1e-12);
+  EXPECT_NEAR(path->at(2.0).velocity_W_m_s.x(), 0.375, 1e-12);  // 1.5 x the mean speed
+}
+
+TEST(WaypointPath, RefusesWhatIsWrong) {
+  const auto refused = [](const char* text) { return refusal(waypoint_file(text), kAnything); };
+  EXPECT_NE(refused("0 0 0 0\n1 2 3\n").find(":2: expected four numbers"), std::string::npos);
+  EXPECT_NE(refused("0 0 0 0\n1 2 3 4 5\n").find(":2: expected four numbers"), std::string::npos);
+  EXPECT_NE(refused("0 0 0 0\n1 nan 0 0\n").find(":2: "), std::string::npos);
+  EXPECT_NE(refused("0.1 0 0 0\n1 0 0 0\n").find(":1: the first waypoint"), std::string::npos);
+  EXPECT_NE(refused("0 0 0 0\n1 0 0 0\n1 0 0 0\n").find(":3: times must increase"), std::string::npos);
+  EXPECT_NE(refused("0 0 0 0\n").find("two waypoints"), std::string::npos);
+  EXPECT_NE(refusal("pentagon", kAnything).find("circle, figure8, square, waltz"), std::string::npos);
+}
+
+TEST(WaypointPath, RefusesWhatTheRobotCannotDo) {
+  const std::string fast = waypoint_file("0 0 0 0\n1 1 0 0\n");
+  EXPECT_NE(refusal(fast, {0.6, 100.0, 10.0}).find("m/s at"), std::string::npos);
+  EXPECT_NE(refusal(fast, {2.0, 1.0, 10.0}).find("m/s^2 at"), std::string::npos);
+  EXPECT_EQ(refusal(fast, {2.0, 7.0, 10.0}), "");
+  const std::string turning = waypoint_file("0 0 0 0\n1 0 0 9\n");
+  EXPECT_NE(refusal(turning, {2.0, 7.0, 10.0}).find("rad/s of yaw"), std::string::npos);
+  EXPECT_NE(refusal("waltz", {2.0, 7.0, 1.0}).find("rad/s of yaw"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace equipoise::app

@@ -1,0 +1,183 @@
+// What tools/count_instructions counts: one part of the firmware, a given number of times.
+// usage: instruction_count ROBOT CONFIG PART TIMES
+//   run      ticks of the simulated robot and the pipeline, armed after 100, turning at 1 Hz
+//   ticks    the same, and the recorded samples once more through a fresh pipeline
+//   packed   steps of the default filter as it runs
+//   dense    the same steps of the same model in KalmanFilter, Eigen
+//   bridge   inversions of the drive/coast bridge within its curved region
+//   newton   the same by Newton's method from the printed start, [T] (4.30)-(4.34)
+// Differences between two numbers of times leave the start out.
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "equipoise/actuate/drive_coast.hpp"
+#include "equipoise/runtime/loop.hpp"
+#include "equipoise/runtime/recorded_samples.hpp"
+#include "robots/robot_list.hpp"
+
+namespace equipoise {
+namespace {
+
+constexpr int kArmTick = 100;
+
+Command command_at(int tick) {
+  Command command;
+  command.arm = tick >= kArmTick;
+  command.yaw_rate_rad_s = tick > 2 * kArmTick ? 2.0 * kPi : 0.0;
+  return command;
+}
+
+/// The simulated robot for a number of ticks; its samples are kept.
+template <class World>
+struct WorldIo {
+  World& world;
+  std::vector<RawSample>& samples;
+  int left;
+  MotorCommand motors{};
+
+  int wait_tick(std::int64_t* now_ns) noexcept {
+    if (left-- == 0) return -ESHUTDOWN;
+    world.advance(motors);
+    samples.push_back(world.sense());
+    *now_ns = samples.back().t_ns;
+    return 0;
+  }
+  RawSample read() noexcept { return samples.back(); }
+  int write(const MotorCommand& command) noexcept {
+    motors = command;
+    return 0;
+  }
+  int motors_off() noexcept { return 0; }
+};
+
+template <class Firmware>
+void ticks(const std::string& file, int times, bool again) {
+  Choice choice;
+  choice.estimator = Firmware::kDefaultEstimator;
+  choice.controller = Firmware::kDefaultController;
+  choice.fidelity = "full";
+  const auto config = Firmware::apply(Firmware::load(file, {}).config, choice);
+  runtime::RecordedSamples recording;
+  recording.samples.reserve(static_cast<std::size_t>(times));
+  auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);
+  const std::atomic<bool> never{false};
+  const auto commands = [](std::int64_t tick, std::int64_t) { return command_at(static_cast<int>(tick)); };
+  const auto nobody = [](auto&&...) {};
+  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    WorldIo<decltype(world)> io{world, recording.samples, times};
+    (void)runtime::run_loop(io, pipeline, commands, nobody, never);
+    if (io.motors.enable == 0) throw ConfigError(file + ": the robot is not balancing at the end of the run");
+  });
+  if (!again) return;
+  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    (void)runtime::run_loop(recording, pipeline, commands, nobody, never);
+  });
+}
+
+template <class Filter>
+void steps(Filter filter, int times) {
+  constexpr int p = Filter::p;
+  constexpr int m = Filter::m;
+  std::array<bool, m> use;
+  use.fill(true);
+  const Vec<p> u = Vec<p>::LinSpaced(0.1, -0.1);
+  const Vec<m> y = Vec<m>::LinSpaced(0.02, -0.02);
+  for (int k = 0; k < times; ++k) {
+    filter.predict(u);
+    filter.update(u, y, use);
+  }
+  if (!filter.x().allFinite()) throw std::runtime_error("the filter diverged");
+}
+
+void filter(const std::string& file, const std::string& form, int times, MbbrFirmware /*robot*/) {
+  const MbbrConfig config = load_mbbr(file, {}).config;
+  const auto& ekf = config.estimators.ekf;
+  const MbbrEkfModel model(config.robot, ekf.disturbance_time_constant_s);
+  if (form == "dense") return steps(KalmanFilter<MbbrEkfModel>(model, ekf.filter), times);
+  steps(MbbrEkf::Filter(model, ekf.filter), times);
+}
+
+void filter(const std::string& file, const std::string& form, int times, MipFirmware /*robot*/) {
+  const MipConfig config = load_mip(file, {}).config;
+  const auto& ekf = config.estimators.ekf;
+  const MipEkfModel model(config.robot, ekf.options, ekf.disturbance_time_constant_s);
+  if (form == "dense") return steps(KalmanFilter<MipEkfModel>(model, ekf.filter), times);
+  steps(MipEkf::Filter(model, ekf.filter), times);
+}
+
+/// (4.30)-(4.34) as printed, until a step is below 1e-10; forwards. In 20 steps at most.
+double newton(double T_r, double omega_r, double i_over_is) {
+  double v = std::log(0.5 * (std::exp(T_r) * (1.0 + omega_r) + 1.0 - omega_r)) / (2.0 * T_r);
+  for (int i = 0; i < 20; ++i) {
+    const double e = std::exp(v * T_r);
+    const double current = v * (1.0 - omega_r) +
+                           (1.0 + omega_r) / T_r * std::log(e * (1.0 + omega_r) / (2.0 * e - 1.0 + omega_r));
+    const double slope = 2.0 * (e - 1.0) * (1.0 - omega_r) / (2.0 * e + omega_r - 1.0);
+    const double step = (current - i_over_is) / slope;
+    v -= step;
+    if (std::abs(step) < 1e-10) break;
+  }
+  return v;
+}
+
+/// Speeds and commands over the region that the robot uses, the same for both.
+void bridges(const std::string& how, int times) {
+  const double T_r = MotorParameters().T_r();
+  const DriveCoastInverse inverse(T_r);
+  std::array<std::array<double, 3>, 64> points{};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double omega_r = -0.35 + 0.1 * static_cast<double>(i % 8);
+    const double v = (0.1 + 0.1 * static_cast<double>(i / 8)) * 0.5 * (1.0 + omega_r);
+    points[i] = {omega_r, drive_coast_mean_current(T_r, omega_r, v), v};
+  }
+  double worst = 0.0;
+  const auto run = [&](const auto& solve) {  // nothing else counts
+    for (int k = 0; k < times; ++k) {
+      const auto& [omega_r, current, v] = points[static_cast<std::size_t>(k) % points.size()];
+      const double error = std::abs(solve(omega_r, current) - v);
+      if (!(error <= worst)) worst = error;
+    }
+  };
+  if (how == "newton") {
+    run([&](double omega_r, double current) { return newton(T_r, omega_r, current); });
+  } else {
+    run([&](double omega_r, double current) { return inverse.solve(omega_r, current).u; });
+  }
+  if (!(worst < 1e-6)) throw std::runtime_error(how + ": wrong by " + std::to_string(worst));
+}
+
+template <class Firmware>
+void count(const std::string& file, const std::string& part, int times) {
+  if (part == "run" || part == "ticks") return ticks<Firmware>(file, times, part == "ticks");
+  if (part == "packed" || part == "dense") return filter(file, part, times, Firmware{});
+  if (part == "bridge" || part == "newton") return bridges(part, times);
+  throw std::runtime_error(part + ": no part; run, ticks, packed, dense, bridge or newton");
+}
+
+}  // namespace
+}  // namespace equipoise
+
+int main(int argc, char** argv) {
+  if (argc != 5) {
+    std::fprintf(stderr, "usage: instruction_count ROBOT CONFIG PART TIMES\n");
+    return 2;
+  }
+  try {
+    const std::string file = argv[2];
+    equipoise::with_robot(argv[1], file, [&](auto firmware) {
+      equipoise::count<decltype(firmware)>(file, argv[3], std::atoi(argv[4]));
+    });
+  } catch (const std::exception& problem) {
+    std::fprintf(stderr, "error: %s\n", problem.what());
+    return 1;
+  }
+  return 0;
+}

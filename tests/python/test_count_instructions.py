@@ -1,0 +1,69 @@
+"""The tick's instructions: stages of a profile, the committed counts, and that nothing grows beyond them."""
+
+import json
+import shutil
+
+import pytest
+from equipoise_tools import count_instructions as count
+
+GROWTH = 1.03
+
+PROFILE = """\
+summary: 400
+fl=(1) /src/include/equipoise/pipeline.hpp
+fn=(1) equipoise::Pipeline<equipoise::Mbbr, equipoise::MbbrEstimators>::tick(rio_sensors const&)
+10 5
+fi=(2) /src/include/equipoise/actuate/safety.hpp
+20 7
+fe=(1)
+cfi=(3) /src/src/robots/mbbr/estimators.cpp
+cfn=(2) equipoise::MbbrEstimators::update(equipoise::Measurement<3> const&)
+calls=1 30
+12 100
+cfn=(3) equipoise::Pipeline<equipoise::Mbbr, equipoise::MbbrEstimators>::invert_bridges()
+calls=1 30
++1 40
+
+fl=(3)
+fn=(2)
+30 100
+"""
+
+
+def test_a_profile_is_split_into_the_stages_of_the_tick():
+    assert count.by_stage(PROFILE) == {
+        "total": 400,
+        "sense": 0,
+        "estimate": 100,
+        "reference": 0,
+        "control": 0,
+        "bridge": 40,
+        "safety": 7,
+        "rest": 5,
+    }
+
+
+@pytest.fixture(scope="module")
+def committed(root):
+    return json.loads((root / count.TABLE).read_text(encoding="utf-8"))["x86"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", count.ROBOTS)
+def test_a_tick_costs_no_more_than_committed(root, committed, robot):
+    machine = count.Callgrind(root)
+    if shutil.which("valgrind") is None or not machine.program.is_file():
+        pytest.skip("needs valgrind and the host build")
+    profile = count.tick_profile(machine, robot)
+    found = {
+        "tick": profile["total"],
+        "filter": count.per(machine.total, robot, "packed", count.STEPS),
+        "simulated_tick": profile["run"],
+    }
+    grown = {k: (committed[robot][k], v) for k, v in found.items() if v > GROWTH * committed[robot][k]}
+    assert grown == {}, "if it has to be: tools/count_instructions --write"
+
+
+def test_the_filter_costs_a_fifth_of_its_dense_form(committed):
+    for robot in count.ROBOTS:
+        assert committed[robot]["filter"] <= 0.2 * committed[robot]["dense_filter"]

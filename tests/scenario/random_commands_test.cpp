@@ -1,0 +1,150 @@
+// Any command, suddenly: steps, reversals, full range, turning and driving at once. The governor makes each
+// feasible, so that no robot falls or is switched off. EQUIPOISE_COMMAND_SEQUENCES=1000: as many sequences.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <limits>
+#include <random>
+
+#include "app/cli/reasons.hpp"
+#include "app/evaluate/parallel.hpp"
+#include "support/trial.hpp"
+
+namespace equipoise {
+namespace {
+
+int sequences() {
+  const char* text = std::getenv("EQUIPOISE_COMMAND_SEQUENCES");
+  return text != nullptr ? std::atoi(text) : 20;
+}
+
+struct Range {
+  double speed_m_s;
+  double yaw_rate_rad_s;
+};
+
+/// Holds each command for 0.1 to 3 s; a third of them at the ends of the range.
+class RandomPilot {
+ public:
+  RandomPilot(const Range& range, std::uint64_t seed) : range_(range), random_(seed) {}
+
+  Command at(double time_s) {
+    command_.arm = time_s >= 0.5;
+    if (time_s >= next_s_) {
+      next_s_ = time_s + 0.1 + 2.9 * uniform();
+      const double direction = 2.0 * kPi * uniform();
+      command_.velocity_W_m_s = amount() * range_.speed_m_s * Vec2(std::cos(direction), std::sin(direction));
+      command_.yaw_rate_rad_s = (uniform() < 0.5 ? -1.0 : 1.0) * amount() * range_.yaw_rate_rad_s;
+    }
+    return command_;
+  }
+
+ private:
+  double uniform() { return static_cast<double>(random_() >> 11U) * 0x1p-53; }
+  double amount() {
+    const double kind = uniform();
+    return kind < 1.0 / 3.0 ? 1.0 : kind < 0.45 ? 0.0 : uniform();
+  }
+
+  Range range_;
+  std::mt19937_64 random_;
+  Command command_;
+  double next_s_ = 1.5;
+};
+
+struct Trials {
+  std::string controller;
+  Range range;
+  std::vector<std::string> set{};
+  bool governed = true;
+  int times = 1;  // as many sequences
+};
+
+/// Slew limits as they were before there was a governor, and nothing else of it.
+template <class Params>
+void bypass_governor(Params& reference) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  reference.max_acceleration_m_s2 = 0.5;
+  reference.max_jerk_m_s3 = reference.feasible_acceleration_m_s2 = kNone;
+  if constexpr (std::is_same_v<Params, MbbrReferenceParams>) reference.floor_yaw_acceleration_rad_s2 = kNone;
+  reference.budget = DutyBudget{};
+}
+
+/// When and why the motors went off; empty: they did not.
+template <class Firmware, class Config>
+std::string loss(const Config& config, const Trials& t, std::uint64_t seed) {
+  auto world = Firmware::world(config, app::fidelity_level("full"), seed);
+  RandomPilot pilot(t.range, 1000U + seed);
+  return Firmware::with_pipeline(config, t.controller, [&](auto& pipeline) {
+    app::PlantBackend backend(world);
+    app::Hardware hardware(backend.io());
+    std::string why;
+    std::atomic<bool> done{false};
+    const auto commands = [&](std::int64_t, std::int64_t) { return pilot.at(world.time_s()); };
+    const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&,
+                             const auto& result) {
+      if (world.time_s() > 1.0 && result.arm_state != ArmState::kArmed)
+        why = app::reasons_text(result.reasons) + " at " + std::to_string(world.time_s()) + " s";
+      done = !why.empty() || tick >= static_cast<std::int64_t>(30.0 * kTickHz);
+    };
+    (void)runtime::run_loop(hardware, pipeline, commands, on_tick, done);
+    return why;
+  });
+}
+
+template <class Firmware>
+int lost(const Trials& t) {
+  const app::Choice choice{Firmware::kDefaultEstimator, t.controller, "full"};
+  auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), t.set).config, choice);
+  if (!t.governed) bypass_governor(config.reference);
+  const auto losses = app::in_parallel<std::string>(
+      "random commands", static_cast<std::size_t>(t.times * sequences()), app::threads_for(0),
+      [&](std::size_t i) { return loss<Firmware>(config, t, static_cast<std::uint64_t>(i) + 1); });
+  int count = 0;
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    if (losses[i].empty()) continue;
+    ++count;
+    if (t.governed) std::printf("sequence %zu: %s\n", i + 1, losses[i].c_str());
+  }
+  std::printf("%d of %d lost\n", count, t.times * sequences());
+  return count;
+}
+
+const Range kMbbrRange{0.6, 6.0 * kPi};
+const Range kMipRange{0.8, 10.0};
+
+TEST(RandomCommands, NoneMakesTheMbbrFall) {
+  EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange}), 0);
+}
+
+/// All wheels held by stiction, it tips over its rolling ball as one piece: no encoder is dead.
+TEST(RandomCommands, AHeldRobotThatTipsHasNoDeadEncoder) {
+  const app::Choice choice{app::MbbrFirmware::kDefaultEstimator, "scheduled", "full"};
+  const auto config =
+      app::MbbrFirmware::apply(app::MbbrFirmware::load(config_file<app::MbbrFirmware>(), {}).config, choice);
+  EXPECT_EQ(loss<app::MbbrFirmware>(config, {"scheduled", kMbbrRange}, 994), "");
+}
+
+TEST(RandomCommands, NoneMakesTheMipFallUnderSlc) {
+  EXPECT_EQ(lost<app::MipFirmware>({"slc", kMipRange}), 0);
+}
+
+TEST(RandomCommands, NoneMakesTheMipFallUnderLqr) {
+  EXPECT_EQ(lost<app::MipFirmware>({"lqr", kMipRange}), 0);
+}
+
+/// A configuration that asks for ten times the acceleration is held back to the lean that torque can bring
+/// back.
+TEST(RandomCommands, AnImpatientConfigurationIsHeldBack) {
+  const std::vector<std::string> impatient{"reference.max_acceleration_m_s2=5.0"};
+  EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange, impatient}), 0);
+}
+
+/// Slew limits alone lose 28 of 200 and 195 of 200.
+TEST(RandomCommands, WithoutTheGovernorSomeFall) {
+  EXPECT_GT(lost<app::MbbrFirmware>({"scheduled", kMbbrRange, {}, false, 4}), 0);
+  EXPECT_GT(lost<app::MipFirmware>({"slc", kMipRange, {}, false}), sequences() / 2);
+}
+
+}  // namespace
+}  // namespace equipoise

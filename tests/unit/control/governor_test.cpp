@@ -1,0 +1,87 @@
+#include "equipoise/control/governor.hpp"
+
+#include <gtest/gtest.h>
+
+#include "equipoise/control/allocate.hpp"
+#include "robots/mip/design.hpp"
+
+namespace equipoise {
+namespace {
+
+constexpr SmoothVelocity<2>::Limits kLimits{0.5, 3.0};
+
+TEST(SmoothVelocity, ReachesTheTargetWithinItsLimitsAndWithoutOvershoot) {
+  SmoothVelocity<2> v;
+  const Vec2 target(0.3, -0.4);
+  Vec2 before = Vec2::Zero();
+  for (int k = 0; k < 600; ++k) {
+    v.update(target, kLimits);
+    EXPECT_LE(v.acceleration().norm(), 0.5 + 1e-9);
+    EXPECT_LE((v.acceleration() - before).norm(), 3.0 * kTickS + 1e-9);
+    EXPECT_LE(v.velocity().norm(), 0.5 + 1e-9);
+    before = v.acceleration();
+  }
+  EXPECT_LT((v.velocity() - target).norm(), 1e-6);
+  EXPECT_LT(v.acceleration().norm(), 1e-6);
+}
+
+TEST(SmoothVelocity, StaysWithinItsLimitsWhenTheTargetJumps) {
+  SmoothVelocity<2> v;
+  Vec2 before = Vec2::Zero();
+  for (int k = 0; k < 2000; ++k) {
+    const double sign = (k / 37) % 2 == 0 ? 1.0 : -1.0;
+    v.update(Vec2(0.5 * sign, (k / 53) % 2 == 0 ? 0.4 : -0.4), kLimits);
+    EXPECT_LE(v.acceleration().norm(), 0.5 + 1e-9);
+    EXPECT_LE((v.acceleration() - before).norm(), 3.0 * kTickS + 1e-9);
+    before = v.acceleration();
+  }
+}
+
+TEST(SmoothVelocity, WithoutAJerkLimitIsAPlainSlewWithNothingToFeedForward) {
+  SmoothVelocity<1> v;
+  const SmoothVelocity<1>::Limits limits{0.5, std::numeric_limits<double>::infinity()};
+  v.update(Vec<1>(1.0), limits);
+  EXPECT_DOUBLE_EQ(v.velocity()(0), 0.5 * kTickS);
+  EXPECT_EQ(v.jerk()(0), 0.0);
+  for (int k = 0; k < 500; ++k) v.update(Vec<1>(1.0), limits);
+  EXPECT_NEAR(v.velocity()(0), 1.0, 1e-12);
+}
+
+TEST(DutyBudget, TurnsBeforeItTravels) {
+  DutyBudget b;
+  b.share = 0.6;
+  b.of_friction = 0.1;
+  b.per_yaw_rate = 0.02;
+  b.per_speed = 0.5;
+  EXPECT_DOUBLE_EQ(b.allowed_yaw_rate(10.0), 10.0);
+  EXPECT_DOUBLE_EQ(b.allowed_yaw_rate(-40.0), -25.0);
+  EXPECT_NEAR(b.allowed_speed(0.0), 1.0, 1e-12);
+  EXPECT_NEAR(b.allowed_speed(-10.0), 0.6, 1e-12);
+  EXPECT_EQ(b.allowed_speed(30.0), 0.0);
+}
+
+TEST(DutyBudget, OfTheMipKeepsItsWheelsBelowTheirRate) {
+  const MipParameters p;
+  const DutyBudget b = mip_duty_budget(p, {1.0, 18.0}, 0.8);
+  const double to_wheel = p.d / 2.0;  // m/s of a wheel per rad/s of yaw
+  for (const double yaw_rate : {0.0, 5.0, -10.0, 30.0}) {
+    const double yaw = b.allowed_yaw_rate(yaw_rate);
+    EXPECT_LE((b.allowed_speed(yaw) + to_wheel * std::abs(yaw)) / p.r, 18.0 + 1e-9) << yaw_rate;
+  }
+  EXPECT_NEAR(b.allowed_speed(10.0), 18.0 * p.r - 10.0 * to_wheel, 1e-9);
+  EXPECT_NEAR(b.allowed_yaw_rate(30.0), 18.0 * p.r / to_wheel, 1e-9);
+}
+
+TEST(Allocate, KeepsBalanceAndGivesYawTheRest) {
+  const Vec2 balance(0.7, 0.7);
+  EXPECT_LT((within<2>(balance, Vec2(0.2, -0.2), 1.0) - Vec2(0.9, 0.5)).norm(), 1e-12);
+  const Vec2 shared = within<2>(balance, Vec2(0.6, -0.6), 1.0);
+  EXPECT_NEAR(shared.x(), 1.0, 1e-12);
+  EXPECT_NEAR(shared.sum(), balance.sum(), 1e-12);  // balance untouched
+  const Vec2 full = within<2>(Vec2(1.6, 0.8), Vec2(0.6, -0.6), 1.0);
+  EXPECT_NEAR(full.x(), 1.0, 1e-12);
+  EXPECT_NEAR(full.y(), 0.5, 1e-12);  // no yaw, the direction kept
+}
+
+}  // namespace
+}  // namespace equipoise

@@ -1,0 +1,193 @@
+// The generated filters against the readable dense form, with masks, samples that lie and widened variances.
+// EQUIPOISE_FILTER_STEPS=1000000 makes the comparison longer.
+#include "equipoise/estimate/packed_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <random>
+
+#include "robots/mbbr/config.hpp"
+#include "robots/mbbr/ekf.hpp"
+#include "robots/mip/config.hpp"
+#include "robots/mip/ekf.hpp"
+
+namespace equipoise {
+namespace {
+
+/// IMU beside the axis; sways, rolls and turns both ways up to 1 Hz.
+struct MbbrCase {
+  using Model = MbbrEkfModel;
+  using Filter = MbbrEkf::Filter;
+  static constexpr int kRates = Model::kThetaDotX;
+
+  MbbrConfig config = load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", {}).config;
+  Filter::Params params = config.estimators.ekf.filter;
+
+  Model model() const {
+    MbbrParameters robot = config.robot;
+    robot.l_a.head<2>() << 0.03, -0.02;
+    return {robot, config.estimators.ekf.disturbance_time_constant_s};
+  }
+  static Vec<18> truth(double t) {
+    Vec<18> x;
+    x << 0.05 * std::sin(2.0 * t), 0.04 * std::cos(1.7 * t), 3.0 * std::sin(0.5 * t), 2.0 * std::cos(0.4 * t),
+        20.0 * std::cos(0.3 * t), 0.1 * std::cos(2.0 * t), -0.07 * std::sin(1.7 * t), 6.0 * std::sin(0.3 * t),
+        1.5 * std::cos(0.5 * t), -0.8 * std::sin(0.4 * t), 0.02, -0.03, 0.004, -0.003, 0.01, 0.05, -0.02,
+        0.01;
+    return x;
+  }
+};
+
+/// Sways, rolls and turns both ways up to 10 rad/s.
+struct MipCase {
+  using Model = MipEkfModel;
+  using Filter = MipEkf::Filter;
+  static constexpr int kRates = Model::kThetaDot;
+
+  MipConfig config = load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", {}).config;
+  Filter::Params params = config.estimators.ekf.filter;
+
+  Model model() const {
+    return {config.robot, config.estimators.ekf.options, config.estimators.ekf.disturbance_time_constant_s};
+  }
+  static Vec<14> truth(double t) {
+    Vec<14> x;
+    x << 0.05 * std::sin(2.0 * t), 3.0 * std::sin(0.5 * t), 33.0 * std::sin(0.3 * t), 0.1 * std::cos(2.0 * t),
+        1.5 * std::cos(0.5 * t), 10.0 * std::cos(0.3 * t), 0.02, -0.03, 0.01, 0.004, 0.002, 0.01, 0.05, -0.02;
+    return x;
+  }
+};
+
+template <class Case>
+class PackedFilterTest : public ::testing::Test {
+ protected:
+  using Model = typename Case::Model;
+  using Dense = KalmanFilter<Model>;
+  using Packed = typename Case::Filter;
+  static constexpr int n = Dense::n;
+  static constexpr int m = Dense::m;
+  static constexpr int p = Dense::p;
+
+  Case robot_;
+  Model model_ = robot_.model();
+  Dense dense_{model_, robot_.params};
+  Packed packed_{model_, robot_.params};
+
+  /// In parts of a number or, of small ones, of its unit.
+  double state_error() const {
+    const Vec<n> scale = dense_.x().cwiseAbs().cwiseMax(1.0);
+    return ((packed_.x() - dense_.x()).array() / scale.array()).abs().maxCoeff();
+  }
+  /// In parts of the two standard deviations.
+  double covariance_error() const {
+    const Vec<n> inverse = dense_.P().diagonal().cwiseSqrt().cwiseInverse();
+    return (inverse.asDiagonal() * (packed_.P() - dense_.P()) * inverse.asDiagonal()).cwiseAbs().maxCoeff();
+  }
+  double innovation_error() const {
+    const double mean = dense_.normalized_innovation();
+    double worst = std::abs(packed_.normalized_innovation() - mean) / std::max(1.0, mean);
+    for (std::size_t i = 0; i < m; ++i) {
+      const double nis = dense_.row_nis()[i];
+      worst = std::max(worst, std::abs(packed_.row_nis()[i] - nis) / std::max(1.0, nis));
+      worst = std::max(worst, std::abs(packed_.row_innovation()[i] - dense_.row_innovation()[i]));
+    }
+    return worst;
+  }
+};
+
+using Robots = ::testing::Types<MbbrCase, MipCase>;
+TYPED_TEST_SUITE(PackedFilterTest, Robots);
+
+long steps() {
+  const char* const asked = std::getenv("EQUIPOISE_FILTER_STEPS");
+  return asked != nullptr ? std::strtol(asked, nullptr, 10) : 20'000;
+}
+
+TYPED_TEST(PackedFilterTest, AgreesWithTheDenseFormThroughMasksAndJumps) {
+  constexpr int kOutputs = TestFixture::m;
+  using Input = Vec<TestFixture::p>;
+  using Samples = Vec<kOutputs>;
+  auto& dense = this->dense_;
+  auto& packed = this->packed_;
+  dense.reset(TypeParam::truth(0.0));
+  packed.reset(TypeParam::truth(0.0));
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> noise;
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const Samples sigma = this->robot_.params.R.cwiseSqrt();
+  double worst_x = 0.0;
+  double worst_P = 0.0;
+  double worst_nis = 0.0;
+  int blind = 0;
+  const long end = steps();
+  for (long k = 1; k <= end; ++k) {
+    const Input u = Input::NullaryExpr([&] { return 0.2 * noise(random); });
+    Samples y;
+    Mat<kOutputs, TestFixture::n> H;
+    this->model_.measure(TypeParam::truth(static_cast<double>(k) * kTickS), u, y, H);
+    for (int i = 0; i < kOutputs; ++i) y(i) += sigma(i) * noise(random);
+    if (unit(random) < 0.002) y(static_cast<int>(kOutputs * unit(random))) += 2.0;  // a sample that lies
+    if (unit(random) < 0.001) blind = 20;
+    std::array<bool, kOutputs> use{};
+    for (bool& row : use) row = blind == 0 && unit(random) > 0.1;
+    blind = std::max(0, blind - 1);
+    for (std::size_t i = 0; i < kOutputs; ++i) {
+      if (!use[i] && unit(random) < 0.01) y(static_cast<int>(i)) = std::nan("");  // not to be looked at
+    }
+    dense.predict(u);
+    packed.predict(u);
+    if (unit(random) < 0.005) {
+      dense.widen(TypeParam::kRates, 2, 0.02);
+      packed.widen(TypeParam::kRates, 2, 0.02);
+    }
+    dense.update(u, y, use);
+    packed.update(u, y, use);
+    worst_x = std::max(worst_x, this->state_error());
+    worst_nis = std::max(worst_nis, this->innovation_error());
+    if (k % 16 == 0) worst_P = std::max(worst_P, this->covariance_error());
+    ASSERT_LT(worst_x, 1e-9) << k;
+    ASSERT_LT(worst_P, 1e-9) << k;
+    ASSERT_LT(worst_nis, 1e-8) << k;
+  }
+  std::printf("%ld steps: states %.1e, covariance %.1e, innovations %.1e\n", end, worst_x, worst_P,
+              worst_nis);
+}
+
+TYPED_TEST(PackedFilterTest, HoldsEveryEntryOfTheProcessNoise) {
+  this->robot_.params.initial_variance.setConstant(1e-30);
+  this->dense_ = {this->model_, this->robot_.params};
+  this->packed_ = {this->model_, this->robot_.params};
+  this->dense_.predict(Vec<TestFixture::p>::Zero());
+  this->packed_.predict(Vec<TestFixture::p>::Zero());
+  EXPECT_LT(this->covariance_error(), 1e-12);
+  EXPECT_GT(this->dense_.P().diagonal().minCoeff(), 1e-20);
+}
+
+TYPED_TEST(PackedFilterTest, LeadsTheMotionAheadAsTheModelDoes) {
+  constexpr int kMotion = TestFixture::Packed::kMotion;
+  for (int k = 0; k < 200; ++k) {
+    const double dt = kTickS * (k % 7) / 6.0;
+    const Vec<TestFixture::p> u = Vec<TestFixture::p>::LinSpaced(std::sin(k), -std::cos(k));
+    const Vec<kMotion> before = TypeParam::truth(0.3 * k).template head<kMotion>();
+    Vec<kMotion> after = before;
+    this->packed_.ahead(u, dt, after);
+    const Vec<kMotion> expected = this->model_.ahead(before, u, dt);
+    ASSERT_LT((after - expected).norm(), 1e-12 * (1.0 + expected.norm())) << k;
+    ASSERT_EQ((after - before).norm() > 1e-6, dt > 0.0) << k;
+  }
+}
+
+TYPED_TEST(PackedFilterTest, WithoutSamplesChangesNothing) {
+  this->packed_.predict(Vec<TestFixture::p>::Zero());
+  const auto x = this->packed_.x();
+  const auto P = this->packed_.P();
+  this->packed_.update(Vec<TestFixture::p>::Zero(), Vec<TestFixture::m>::Constant(std::nan("")), {});
+  EXPECT_EQ(this->packed_.x(), x);
+  EXPECT_EQ(this->packed_.P(), P);
+  EXPECT_EQ(this->packed_.normalized_innovation(), 0.0);
+}
+
+}  // namespace
+}  // namespace equipoise

@@ -1,0 +1,215 @@
+"""What the straight-line filters of both robots share: rows of a model, and the layout of the headers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from . import emit
+from .model_header import Model
+from .packed import Covariance, heun_state
+from .straight import Emitter, pair, total
+
+DT = 0.005  # kTickS; the header asserts it
+
+
+class ModelRows:
+    """Outputs of a small-angle model and their Jacobian, with named coefficients."""
+
+    def __init__(self, model: Model, index: int):
+        rows = model.rows[index]
+        self.model = model
+        self.terms = [
+            {m: sp.Symbol(f"c.{name}_{label}") for label, m, _ in model.terms(e)}
+            for name, e in zip(rows.names, rows.expressions, strict=True)
+        ]
+
+    def evaluate(self, em: Emitter, x, u, scale: float = 1.0, together=()):
+        """scale times outputs and Jacobian; outputs are affine in the small states.
+
+        together: pairs of rows with the same products of states and inputs, computed at once.
+        """
+        values = dict(zip((*self.model.state, *self.model.inputs), (*x, *u), strict=True))
+        outputs: list = [None] * len(self.terms)
+        J: list = [None] * len(self.terms)
+        alone = set(range(len(self.terms))) - {i for pair in together for i in pair}
+        for rows in [*((i,) for i in sorted(alone)), *together]:
+            output, row = self._row(em, values, scale, rows)
+            for lane, i in enumerate(rows):
+                outputs[i] = output if len(rows) == 1 else output[lane]
+                J[i] = row if len(rows) == 1 else [v[lane] for v in row]
+        return outputs, J
+
+    def _row(self, em: Emitter, values: dict, scale: float, rows):
+        model = self.model
+        products = list(dict.fromkeys(m for i in rows for m in self.terms[i]))
+
+        def value(factor_of):
+            """The sum over the products of what factor_of leaves of them, times their coefficients."""
+            parts = []
+            for m in products:
+                number, rest = sp.sympify(factor_of(m)).as_coeff_Mul()
+                if number == 0:
+                    continue
+                lanes = [em.of(scale * number * self.terms[i].get(m, 0), values) for i in rows]
+                coefficient = lanes[0] if len(rows) == 1 else pair(*lanes)
+                parts.append(coefficient * em.of(rest, values))
+            return total(parts) if parts else em.constant(0.0)
+
+        J = [value(lambda m, v=v: sp.diff(m, v)) for v in model.state]
+        rest = value(lambda m: 0 if m.free_symbols & set(model.small) else m)
+        small = [(J[j], values[v]) for j, v in enumerate(model.state) if v in model.small]
+        return total([*(a * b for a, b in small), rest]), J
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A filter's states, and the two functions of one step as (early lines, how many they keep, lines)."""
+
+    robot: str
+    states: list[str]  # in the model's order
+    motion: int  # the first of them
+    inputs: int
+    outputs: int
+    B: list[tuple[int, int]]  # where a unit of u moves a state within a tick, upright: (state, input)
+    constants: list[str]  # further members of Constants
+    ahead: Emitter
+    predict: Emitter
+    correct: Emitter
+    scripts: tuple[str, ...]  # which it comes from
+
+    @property
+    def noise(self) -> list[tuple[int, int]]:
+        return noise_places(len(self.states), self.B)
+
+
+def noise_places(n: int, B) -> list[tuple[int, int]]:
+    """Where Q has entries: the diagonal, and what one input moves together."""
+    pairs = {(i, i) for i in range(n)}
+    for b in {i for _, i in B}:
+        states = [r for r, i in B if i == b]
+        pairs |= {(i, j) for i in states for j in states if i <= j}
+    return sorted(pairs)
+
+
+def add_noise(em: Emitter, P: Covariance, B) -> None:
+    for place, (i, j) in enumerate(noise_places(P.n, B)):
+        P[i, j] = P[i, j] + em.variable(f"k.Q[{place}]", early=True)
+
+
+def ahead(derivative, motion: int, inputs: int) -> Emitter:
+    """The motion's states after dt; derivative(em, u): that of the robot."""
+    em = Emitter("k.ahead")
+    u = [em.variable(f"u[{i}]") for i in range(inputs)]
+    x = [em.variable(f"x[{i}]") for i in range(motion)]
+    for i, value in enumerate(heun_state(x, derivative(em, u), em.variable("dt"))):
+        em.store(f"x[{i}]", value)
+    return em
+
+
+def _places(name: str, about: str, places) -> list[str]:
+    text = ", ".join(f"{{{i}, {j}}}" for i, j in places)
+    lines = emit.statement(f"static constexpr int {name}[{len(places)}][2] = {{{text}}};")
+    return [f"  /// {about}.", *lines]
+
+
+def _kept(filter: Filter) -> list[str]:
+    lines = ["    // By prepare():"]
+    for name in ("ahead", "predict", "correct"):
+        code = getattr(filter, name).lines()
+        if code.values:
+            lines.append(f"    double {name}[{code.values}];")
+        if code.pairs:
+            lines.append(f"    Pair {name}_pairs[{code.pairs}];")
+    return lines
+
+
+def _file(filter: Filter, suffix: str, about: list[str], includes: list[str], body: list[str]) -> str:
+    about = [*about, "SI, rad. Source: docs/derivation.md, docs/filter.md. RT-safe."]
+    script = f"{filter.robot}_filter.py"
+    text = emit.header(about, script, emit.input_hash(*filter.scripts), "equipoise::generated", body, ())
+    once = ["#pragma once", ""] if suffix == "hpp" else []
+    return text.replace("#pragma once\n", "\n".join([*once, *includes, ""]), 1)
+
+
+def render(filter: Filter) -> str:
+    n, m, p = len(filter.states), filter.outputs, filter.inputs
+    name = filter.robot.capitalize()
+    body = [
+        f"struct {name}Filter {{",
+        f"  static constexpr int kStates = {n};",
+        f"  static constexpr int kMotion = {filter.motion};  // states that move, the first",
+        f"  static constexpr int kInputs = {p};",
+        f"  static constexpr int kOutputs = {m};",
+        f"  static constexpr int kTriangle = {Covariance.size(n)};  // of P, upper, rows from even columns",
+        f"  static constexpr double kTickS = {DT};",
+        *_places("kB", "Entries of B: state, input", filter.B),
+        *_places("kQ", "Entries of Q: row, column", filter.noise),
+        "",
+        "  struct Constants {",
+        f"    {filter.robot}::Coefficients<double> c;",
+        *[f"    {line}" for line in filter.constants],
+        f"    double B[{len(filter.B)}];",
+        f"    double Q[{len(filter.noise)}];",
+        f"    double R[{m}];",
+        *_kept(filter),
+        "  };",
+        "  /// Fills in what follows from the rest.",
+        "  static void prepare(Constants& k) noexcept;",
+        "  /// x after dt with what acts, input and disturbance.",
+        f"  static void ahead(const Constants& k, const double u[{p}], double dt,",
+        f"                    double x[{filter.motion}]) noexcept;",
+        "  /// x, P after a tick with input u.",
+        f"  static void predict(const Constants& k, const double u[{p}], double x[{n}],",
+        "                      double P[kTriangle]) noexcept;",
+        "  /// x, P after the samples y, of which those count whose flag is set.",
+        "  /// row_nis: squared innovation over its variance; 0 where not used, as row_innovation.",
+        f"  static void correct(const Constants& k, const double u[{p}], const double y[{m}],",
+        f"                      const bool use[{m}], double x[{n}], double P[kTriangle],",
+        f"                      double row_innovation[{m}], double row_nis[{m}]) noexcept;",
+        "};",
+        "",
+    ]
+    about = [f"Layout of the {filter.robot.upper()}'s straight-line filter in {filter.robot}_filter.cpp."]
+    includes = ['#include "equipoise/estimate/pair.hpp"', f'#include "generated/{filter.robot}_model.hpp"']
+    return _file(filter, "hpp", about, includes, body)
+
+
+def render_code(filter: Filter) -> str:
+    n, m, p = len(filter.states), filter.outputs, filter.inputs
+    name = filter.robot.capitalize() + "Filter"
+    ahead, predict, correct = (e.lines() for e in (filter.ahead, filter.predict, filter.correct))
+    body = [
+        f"void {name}::prepare(Constants& k) noexcept {{",
+        *(line for code in (ahead, predict, correct) for line in ("  {", *code.early, "  }") if code.early),
+        "}",
+        "",
+        f"void {name}::ahead(const Constants& k, const double u[{p}], double dt,",
+        f"    double x[{filter.motion}]) noexcept {{",
+        *ahead.late,
+        "}",
+        "",
+        f"void {name}::predict(const Constants& k, const double u[{p}], double x[{n}],",
+        "    double P[kTriangle]) noexcept {",
+        *predict.late,
+        "}",
+        "",
+        f"void {name}::correct(const Constants& k, const double u[{p}], const double y[{m}],",
+        f"    const bool use[{m}], double x[{n}], double P[kTriangle], double row_innovation[{m}],",
+        f"    double row_nis[{m}]) noexcept {{",
+        *correct.late,
+        "}",
+        "",
+    ]
+    about = [
+        f"One step of the {filter.robot.upper()}'s default filter, straight-line: Heun's third order,",
+        "F P F' as row operations on a packed triangle, scalar measurements with masks instead of branches.",
+        f"The model in robots/{filter.robot}/ekf.hpp is the readable form and the reference in tests.",
+    ]
+    includes = [
+        "#include <cmath>",
+        "",
+        f'#include "generated/{filter.robot}_filter.hpp"',
+    ]
+    return _file(filter, "cpp", about, includes, body)

@@ -1,0 +1,201 @@
+"""Steps of a Kalman filter as straight-line code: the covariance as a packed upper triangle, Heun's rule, the
+scalar updates. No matrix product is formed."""
+
+from __future__ import annotations
+
+from .straight import Emitter, Value, dot, inner, nonzero, pair, total
+
+
+class Covariance:
+    """A symmetric n x n matrix, n even, whose upper triangle lies packed by rows in an array.
+
+    Rows start at an even column, so that pairs are aligned: an odd row has an unused entry in front.
+    """
+
+    def __init__(self, emitter: Emitter, array: str, n: int):
+        self.emitter, self.n, self.array = emitter, n, array
+        self.value = {(i, j): emitter.variable(self.place(i, j)) for i in range(n) for j in range(i, n)}
+
+    def place(self, i: int, j: int) -> str:
+        i, j = min(i, j), max(i, j)
+        before = i * self.n - 2 * (i // 2) * ((i - 1) // 2)  # entries of the rows above
+        return f"{self.array}[{before + j - i // 2 * 2}]"
+
+    @staticmethod
+    def size(n: int) -> int:
+        return n * (n + 2) // 2
+
+    def __getitem__(self, ij):
+        return self.value[min(ij), max(ij)]
+
+    def __setitem__(self, ij, value):
+        self.value[min(ij), max(ij)] = value
+
+    def pair(self, k: int, q: int) -> Value:
+        """Columns 2 q and 2 q + 1 of row k."""
+        a, b = self[k, 2 * q], self[k, 2 * q + 1]
+        in_memory = (a.key, b.key) == (("v", self.place(k, 2 * q)), ("v", self.place(k, 2 * q + 1)))
+        if in_memory and k <= 2 * q:
+            return self.emitter.load(self.place(k, 2 * q))
+        return pair(a, b)
+
+    def transform(self, rows: dict[int, dict]) -> None:
+        """P = T P T' with T the identity but for `rows` (sparse, diagonal entry included)."""
+        half = {i: {} for i in rows}
+        for q in range(self.n // 2):
+            columns = {k: self.pair(k, q) for row in rows.values() for k in nonzero(row)}
+            for i, row in rows.items():
+                both = dot(row, columns.__getitem__)
+                half[i][2 * q], half[i][2 * q + 1] = both[0], both[1]
+        for i in rows:
+            for j in range(self.n):
+                if j not in rows:
+                    self[i, j] = half[i][j]
+                elif i <= j:
+                    self[i, j] = inner(rows[j], half[i].__getitem__)
+
+    def reduce(self, gains: list[list[Value]], vectors: list[list[Value]]) -> None:
+        """P -= the sum of gain vector'; gains by entry, vectors by pair."""
+        for i in range(self.n):
+            for q in range(i // 2, self.n // 2):
+                whole = 2 * q >= i
+                both = self.pair(i, q) if whole else self[i, 2 * q + 1]
+                for gain, vector in zip(gains, vectors, strict=True):
+                    both = both - gain[i] * (vector[q] if whole else vector[q][1])
+                if whole:
+                    self[i, 2 * q], self[i, 2 * q + 1] = both[0], both[1]
+                else:
+                    self[i, 2 * q + 1] = both
+
+    def store(self) -> None:
+        """Neighbours that are a pair in one go."""
+        for i in range(self.n):
+            j = i
+            while j < self.n:
+                both = self.pair(i, j // 2) if j % 2 == 0 and j + 1 < self.n else None
+                if both is not None and both.pair and self[i, j].key == both[0].key:
+                    self.emitter.store(self.place(i, j), both)
+                    j += 1
+                else:
+                    self.emitter.store(self.place(i, j), self[i, j])
+                j += 1
+
+
+def heun(x: list[Value], derivative, dt: float):
+    """(x after dt, its Jacobian as sparse rows) by Heun's third-order rule, as in estimate/heun.hpp.
+
+    derivative(x, scale) -> (scale x_dot, scale A as a sparse dict): a scale within costs nothing.
+    """
+    first, A_first = derivative(x, dt / 3.0)
+    second, A_second = derivative([a + b for a, b in zip(x, first, strict=True)], 2.0 * dt / 3.0)
+    third, A_third = derivative([a + b for a, b in zip(x, second, strict=True)], 0.75 * dt)
+    after = [a + (0.75 * b + c) for a, b, c in zip(x, first, third, strict=True)]
+    one, part = (x[0].emitter.constant(c) for c in (1.0, 0.75))
+    A_first, A_second, A_third = (_rows(A) for A in (A_first, A_second, A_third))
+    slope = _sum((one, A_second), (one, _times(A_second, A_first)))
+    identity = {i: {i: one} for i in range(len(x))}
+    return after, _sum((one, identity), (part, A_first), (one, A_third), (one, _times(A_third, slope)))
+
+
+def heun_state(x: list[Value], derivative, dt: Value) -> list[Value]:
+    """x after dt alone, dt as it comes; what only the Jacobian needs is not emitted."""
+    third = dt * (1.0 / 3.0)
+    first, _ = derivative(x, 1.0)
+    second, _ = derivative([a + third * b for a, b in zip(x, first, strict=True)], 1.0)
+    slope, _ = derivative([a + (third + third) * b for a, b in zip(x, second, strict=True)], 1.0)
+    return [a + dt * 0.25 * (b + 3.0 * c) for a, b, c in zip(x, first, slope, strict=True)]
+
+
+def by_pairs(terms: list[tuple[Value, dict]]) -> dict:
+    """The sum of factor times sparse row; neighbours that both have an entry are computed at once."""
+    result: dict = {}
+    terms = [(c, nonzero(row)) for c, row in terms if c.number != 0.0]
+    columns = {j for _, row in terms for j in row}
+    for even in sorted({j - j % 2 for j in columns}):
+        odd = even + 1
+        if not {even, odd} <= columns:
+            j = even if even in columns else odd
+            result[j] = total(c * row[j] for c, row in terms if j in row)
+            continue
+        both = []
+        for c, row in terms:
+            zero = c.emitter.constant(0.0)
+            if even in row and odd in row:
+                both.append(c * pair(row[even], row[odd]))
+            elif even in row:
+                both.append(pair(c * row[even], zero))
+            elif odd in row:
+                both.append(pair(zero, c * row[odd]))
+        whole = total(both)
+        result[even], result[odd] = whole[0], whole[1]
+    return result
+
+
+def _rows(A: dict) -> dict:
+    rows: dict = {}
+    for (i, j), v in A.items():
+        rows.setdefault(i, {})[j] = v
+    return rows
+
+
+def _times(A: dict, B: dict) -> dict:
+    """Rows of A B; a row that B does not have is zero."""
+    return {i: by_pairs([(a, B[k]) for k, a in row.items() if k in B]) for i, row in A.items()}
+
+
+def _sum(*summands: tuple[Value, dict]) -> dict:
+    """Of rows, each times a factor."""
+    rows = {i for _, A in summands for i in A}
+    return {i: by_pairs([(c, A[i]) for c, A in summands if i in A]) for i in sorted(rows)}
+
+
+def correct(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[Value], sums: dict) -> None:
+    """All measurements, one after the other; P loses what all of them take in one go.
+
+    `sums`: sums of states, by name, that several rows use. Stores x, P, every row's innovation and its
+    square over its variance. A row whose flag is clear has no gain.
+    """
+    n, one = P.n, emitter.constant(1.0)
+
+    def measured(row, vector):
+        return dot(row, lambda s: dot(sums.get(s, {s: one}), vector))
+
+    def covered(row, vector):
+        flat: dict = {}
+        for s, c in row.items():
+            for k, v in sums.get(s, {s: one}).items():
+                flat[k] = flat[k] + c * v if k in flat else c * v
+        return inner(flat, vector.__getitem__)
+
+    Ph = [[] for _ in rows]
+    for q in range(n // 2):
+        columns = {}
+        for i, row in enumerate(rows):
+            Ph[i].append(measured(row, lambda k, q=q, known=columns: known.setdefault(k, P.pair(k, q))))
+    correction = [emitter.constant(0.0)] * (n // 2)
+    gains, weights, innovations, squared = [], [], [], []
+    for i, row in enumerate(rows):
+        entries = [[p[lane] for p in before for lane in (0, 1)] for before in Ph[: i + 1]]
+        covariances = [covered(row, e) for e in entries]  # with the rows before it, and its own
+        shares = [c * w for c, w in zip(covariances, weights, strict=False)]
+        variance = covariances[i] + emitter.variable(f"k.R[{i}]", early=True)
+        innovation = residuals[i]
+        for share, c, before, seen in zip(shares, covariances, Ph, innovations, strict=False):
+            variance = variance - share * c
+            innovation = innovation - share * seen
+            Ph[i] = [p - share * b for p, b in zip(Ph[i], before, strict=True)]
+        weight = emitter.select(f"use[{i}]", variance.inverse())
+        innovation = emitter.select(f"use[{i}]", innovation)
+        gain = [p * weight for p in Ph[i]]
+        gains.append([g[lane] for g in gain for lane in (0, 1)])
+        correction = [c + g * innovation for c, g in zip(correction, gain, strict=True)]
+        weights.append(weight)
+        innovations.append(innovation)
+        squared.append(innovation * innovation * weight)
+    P.reduce(gains, Ph)
+    for q in range(n // 2):
+        emitter.store(f"x[{2 * q}]", emitter.load(f"x[{2 * q}]") + correction[q])
+    P.store()
+    for i in range(len(rows)):
+        emitter.store(f"row_innovation[{i}]", innovations[i])
+        emitter.store(f"row_nis[{i}]", squared[i])

@@ -1,0 +1,1 @@
+"""The cockpit: one robot, simulated or real, in a browser on this machine."""

@@ -1,0 +1,1 @@
+"""Mutation testing: which one-token changes of the firmware its tests notice."""

@@ -1,0 +1,158 @@
+"""`tools/mutation`: draws mutants, judges them, keeps the outcomes, writes docs/mutation.md."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import queue
+import random
+import sys
+import tempfile
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from ..entry import leave
+from ..paths import UserError, repository_root
+from .bench import Build, Outcome, Worker
+from .generate import Mutant, mutants
+from .page import reasons, write_page
+from .rooms import ROOMS, Room, Stage
+from .store import Store, key_of, tests_of
+
+
+def drawn(room: Room, name: str, root: Path, sample: int, seed: int) -> list[tuple[Path, str, Mutant]]:
+    """A random sample of a room's mutants; a larger one contains a smaller one."""
+    every = []
+    for path in room.paths(root):
+        text = path.read_text()
+        file = path.relative_to(root)
+        every += [(file, text, mutant) for mutant in mutants(text)]
+    random.Random(f"{seed} {name}").shuffle(every)
+    return every[:sample] if sample else every
+
+
+def kept(
+    store: Store, chosen: list[tuple[Path, str, Mutant]], tests: str
+) -> list[tuple[Path, str, Mutant, Outcome]]:
+    """Those of a sample that are known, up to the first that is not: a smaller sample."""
+    outcomes = []
+    for file, text, mutant in chosen:
+        outcome = store.kept(key_of(file, mutant.of(text)), tests)
+        if outcome is None:
+            break
+        outcomes.append((file, text, mutant, outcome))
+    return outcomes
+
+
+class Campaign:
+    def __init__(self, root: Path, store: Store, jobs: int, work: Path):
+        self.root, self.store = root, store
+        build = Build(root, root / "build" / "host")
+        self.workers: queue.SimpleQueue[Worker] = queue.SimpleQueue()
+        for i in range(jobs):
+            self.workers.put(Worker(build, work / f"worker-{i}"))
+        self.jobs = jobs
+        self.lock = threading.Lock()
+        self.limits: dict[Stage, float] = {}
+        self.codes: dict[Path, str] = {}
+
+    def unchanged(self, worker: Worker, stages: list[Stage], file: Path, text: str):
+        """Time limits of the stages, and the object code of the file."""
+        with self.lock:
+            if file not in self.codes:
+                self.codes[file] = worker.unchanged_code(file, text)
+            for stage in stages:
+                if stage not in self.limits:
+                    self.limits[stage] = worker.limit(stage, file, text)
+        return self.limits, self.codes[file]
+
+    def judge(self, room: Room, tests: str, file: Path, text: str, mutant: Mutant) -> Outcome:
+        worker = self.workers.get()
+        try:
+            stages = [stage for stage in room.stages if stage.is_for(str(file))]
+            limits, same = self.unchanged(worker, stages, file, text)
+            outcome = worker.judge(stages, file, text, mutant, limits, same)
+        finally:
+            self.workers.put(worker)
+        self.store.add(key_of(file, mutant.of(text)), tests, file, mutant, outcome)
+        print(f"{outcome.status:12} {file}:{mutant.line} {mutant.change[:90]}", file=sys.stderr, flush=True)
+        return outcome
+
+    def go(self, name: str, room: Room, sample: int, seed: int) -> list[tuple[Path, str, Mutant, Outcome]]:
+        tests = tests_of(room, self.root)
+        chosen = drawn(room, name, self.root, sample, seed)
+        known = [self.store.known(key_of(file, mutant.of(text)), tests) for file, text, mutant in chosen]
+        print(f"{name}: {len(chosen)} mutants, {sum(map(bool, known))} known", file=sys.stderr, flush=True)
+        with ThreadPoolExecutor(self.jobs) as pool:
+            waiting = [
+                None if was else pool.submit(self.judge, room, tests, *each)
+                for each, was in zip(chosen, known, strict=True)
+            ]
+            try:
+                outcomes = [was or future.result() for was, future in zip(known, waiting, strict=True)]
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+        return [(*each, outcome) for each, outcome in zip(chosen, outcomes, strict=True)]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        prog="tools/mutation",
+        description="Changes the firmware by one token at a time and looks which changes its tests notice. "
+        "Outcomes are kept in build/mutation: started again it goes on where it was interrupted. Writes "
+        "docs/mutation.md when no room is named. Exit status: 1 when a survivor has no reason in "
+        "tests/mutation/reasons.toml.",
+    )
+    parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)} (default: all)")
+    parser.add_argument("--sample", type=int, default=40, help="mutants per room (default 40; 0: all)")
+    parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time (default: the cores)")
+    parser.add_argument("--list", action="store_true", help="print the sample and change nothing")
+    parser.add_argument(
+        "--kept", action="store_true", help="judge nothing: a page of what was measured before of this code"
+    )
+    parser.add_argument("--page", action="store_true", help="write the page also when rooms are named")
+    options = parser.parse_args()
+    unknown = [name for name in options.rooms if name not in ROOMS]
+    if unknown:
+        parser.error(f"no room {', '.join(unknown)}; there are: {', '.join(ROOMS)}")
+    root = repository_root()
+    chosen = {name: ROOMS[name] for name in options.rooms or ROOMS}
+    if options.list:
+        for name, room in chosen.items():
+            for file, _, mutant in drawn(room, name, root, options.sample, options.seed):
+                print(f"{name} {file}:{mutant.line} {mutant.kind}: {mutant.change}")
+        return 0
+    if not (root / "build" / "host" / "build.ninja").is_file():
+        raise UserError("there is no build to start from; tools/mutation makes one")
+    place = root / "build" / "mutation"
+    place.mkdir(parents=True, exist_ok=True)
+    store = Store(place / "results.jsonl")
+    if options.kept:
+        measured = {
+            name: kept(store, drawn(room, name, root, options.sample, options.seed), tests_of(room, root))
+            for name, room in chosen.items()
+        }
+    else:
+        with tempfile.TemporaryDirectory(dir=place, prefix="work-") as work:
+            campaign = Campaign(root, store, options.jobs, Path(work))
+            measured = {
+                name: campaign.go(name, room, options.sample, options.seed) for name, room in chosen.items()
+            }
+    why = reasons(root)
+    text, unexplained = write_page(
+        measured, why, None if options.kept else options.sample, options.seed, root
+    )
+    if options.rooms and not options.page:
+        print(text)
+    else:
+        (root / "docs" / "mutation.md").write_text(text)
+    for line in unexplained:
+        print(f"no reason for: {line}", file=sys.stderr)
+    return 1 if unexplained else 0
+
+
+if __name__ == "__main__":
+    leave(main)

@@ -1,0 +1,165 @@
+"""Which tests speak for which sources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A binary of the build, of only these of its tests. Cheap ones go first: most mutants get no further."""
+
+    binary: str
+    tests: tuple[str, ...]  # sources under tests/ that are linked; the binary's fixtures, too
+    sources: tuple[str, ...] = ()  # compiled anew for every mutant of a header
+    filter: str = "*"
+    program: bool = False  # the tests start `equipoise`: it is linked anew, too
+    only: tuple[str, ...] = ("*",)  # files whose mutants it is for
+    never: tuple[str, ...] = ()
+    twice: bool = False  # in real time: a mutant is killed by two failures in a row, not by one
+
+    def is_for(self, file: str) -> bool:
+        return any(fnmatch(file, p) for p in self.only) and not any(fnmatch(file, p) for p in self.never)
+
+
+@dataclass(frozen=True)
+class Room:
+    files: tuple[str, ...]
+    stages: tuple[Stage, ...]
+    target: float = 0.8
+
+    def paths(self, root: Path) -> list[Path]:
+        """Sources of the build: of two versions of a library's interface one is."""
+        built = (root / "build" / "host" / "build.ninja").read_text()
+        every = {path for pattern in self.files for path in root.glob(pattern)}
+        return sorted(path for path in every if path.suffix != ".c" or f"/{path.name}.o" in built)
+
+
+DRIVER_FIXTURES = ("drivers/testbed.cpp", "drivers/fake_imu.cpp", "drivers/syscall_journal.cpp")
+# Whose tests are asked first; all others, too, when those do not notice.
+DRIVER_TESTS = {
+    **{name: name for name in ("adc", "can", "cutoff", "dmp", "eqep", "mpu9250", "pwm", "serial", "sysfs")},
+    **dict.fromkeys(("led", "button"), "led_button"),
+    **dict.fromkeys(("hbridge", "mc33926", "tb6612"), "bridge"),
+}
+DRIVER_BINARY = "tests/drivers/driver_tests"
+DRIVER_OWN = (*DRIVER_FIXTURES, "drivers/fake_gpio.cpp", "drivers/board_fixture.cpp")
+COMMANDS = (
+    *(
+        "command_auth",
+        "command_key",
+        "command_receiver",
+        "command_sender",
+        "command_follower",
+        "command_wire",
+    ),
+)
+
+ROOMS: dict[str, Room] = {
+    "safety": Room(
+        (
+            "src/actuate/safety.cpp",
+            "include/equipoise/actuate/degraded.hpp",
+            "include/equipoise/actuate/encoder_check.hpp",
+        ),
+        (
+            Stage(
+                "tests/unit_tests",
+                (
+                    "unit/safety*_test.cpp",
+                    "unit/actuate/degraded_test.cpp",
+                    "unit/actuate/encoder_check_test.cpp",
+                ),
+            ),
+            Stage("tests/scenario_tests", ("scenario/reasons_test.cpp",), only=("*safety.cpp",)),
+        ),
+        target=0.9,
+    ),
+    "guard": Room(
+        ("src/app/guard/guard.cpp", "src/app/guard/guard_bridges.cpp"),
+        (
+            Stage("tests/unit_tests", ("unit/app/guard_loop_test.cpp",)),
+            Stage("tests/runtime/runtime_tests", ("runtime/guard_test.cpp",), program=True, twice=True),
+        ),
+        target=0.9,
+    ),
+    "heartbeat": Room(
+        (
+            "src/runtime/heartbeat.cpp",
+            *(f"include/equipoise/runtime/{n}.hpp" for n in ("heartbeat", "supervisor")),
+        ),
+        (
+            Stage("tests/unit_tests", ("unit/app/guard_loop_test.cpp",)),
+            Stage(
+                "tests/runtime/runtime_tests",
+                ("runtime/guard_test.cpp",),
+                filter="SharedHeartbeat*:Supervisor*",
+                twice=True,
+            ),
+        ),
+        target=0.9,
+    ),
+    "command_auth": Room(
+        tuple(f"src/runtime/{name}.cpp" for name in COMMANDS),
+        (
+            Stage(
+                "tests/unit_tests",
+                tuple(f"unit/runtime/{name}_test.cpp" for name in COMMANDS[:2] + COMMANDS[3:5]),
+            ),
+            Stage("tests/app_tests", ("app/wires_test.cpp",)),
+        ),
+        target=0.9,
+    ),
+    "drivers": Room(
+        ("drivers/*.c",),
+        (
+            Stage(
+                "tests/drivers/libgpiod_tests",
+                ("drivers/libgpiod_test.cpp", *DRIVER_FIXTURES),
+                only=("drivers/gpio*.c",),
+            ),
+            *(
+                Stage(DRIVER_BINARY, (f"drivers/{test}_test.cpp", *DRIVER_OWN), only=(f"drivers/{name}.c",))
+                for name, test in DRIVER_TESTS.items()
+            ),
+            Stage(
+                DRIVER_BINARY,
+                ("drivers/*_test.cpp", *DRIVER_OWN),
+                never=("drivers/gpio*.c",),  # a fake stands in their place
+            ),
+        ),
+        target=0.9,
+    ),
+    "log": Room(
+        (
+            *(f"src/runtime/{name}.cpp" for name in ("log_writer", "log_parts")),
+            *(f"src/app/log/{name}.cpp" for name in ("log_reader", "run_log")),
+        ),
+        (
+            Stage("tests/unit_tests", ("unit/runtime/log_writer_test.cpp",)),
+            Stage("tests/app_tests", ("app/run_log_test.cpp",)),
+        ),
+    ),
+    "replay": Room(
+        ("src/app/log/replay.cpp", "src/app/log/replay_as.hpp"),
+        (Stage("tests/replay_tests", ("replay/fault_replay_test.cpp",)),),
+    ),
+    "bridge": Room(
+        ("include/equipoise/actuate/bridge.hpp", "src/actuate/drive_coast.cpp"),
+        (Stage("tests/unit_tests", ("unit/actuate/drive_coast_test.cpp",)),),
+    ),
+    "estimators": Room(
+        ("include/equipoise/estimate/*.hpp", "include/equipoise/sense/freshness.hpp"),
+        (Stage("tests/unit_tests", ("unit/estimate/*_test.cpp", "unit/sense/freshness_test.cpp")),),
+    ),
+    "control": Room(
+        ("include/equipoise/control/*.hpp", "src/control/*.cpp"),
+        (Stage("tests/unit_tests", ("unit/control/*_test.cpp",)),),
+    ),
+    "pipeline": Room(
+        ("include/equipoise/pipeline.hpp",),
+        (Stage("tests/scenario_tests", ("scenario/not_finite_test.cpp",)),),
+    ),
+}

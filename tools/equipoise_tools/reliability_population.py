@@ -1,0 +1,82 @@
+"""Faults of imperfect, held-out robots, and sound ones that must be left alone."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from .campaign_statistics import wilson
+from .reliability_part import BINARY, CONFIGS, Part, output
+
+# Of the robots that no limit was chosen on; the typical one is part of `faults`.
+HELD_OUT = 201
+POPULATION_FAULTS = (
+    *(f"gyro_{axis}_{what}" for what in ("frozen", "zero", "flipped") for axis in "xyz"),
+    *("gyro_xy_swapped", "gyro_yz_swapped", "gyro_zx_swapped", "gyro_ramp", "bias_jump", "noise_burst"),
+    *("accel_frozen", "duplicated", "two_encoders_dead", "motor_dead", "motors_swapped", "motor_stuck"),
+)
+PHASES = ("balancing", "spinning", "driving", "spin_driving")
+
+
+def of_population(config, faults, robots: int) -> list[dict]:
+    """Cases of drawn, imperfect robots."""
+    command = [BINARY, "campaign", "--config", config, "--fidelity", "full", "--json", "-"]
+    command += ["--robot", HELD_OUT, "--robots", robots]
+    for option, values in (("--fault", faults), ("--phase", PHASES)):
+        for value in values:
+            command += [option, value]
+    return json.loads(output(*command, check=False))["cases"]
+
+
+def found(cases: list[dict]) -> str:
+    """When, in ticks after the first spoilt one: median and the last, and how many were not."""
+    ticks = sorted(c["found_after_ticks"] for c in cases if c["found_after_ticks"] is not None)
+    never = len(cases) - len(ticks)
+    if not ticks:
+        return "not found"
+    text = f"{ticks[len(ticks) // 2]} / {ticks[-1]}"
+    return f"{text}; {never} of {len(cases)} not" if never else text
+
+
+def unsafe_ones(cases: list[dict]) -> str:
+    """Each by name: it can be run again alone (`equipoise campaign --robot N --fault NAME --phase NAME`)."""
+    named = [f"- {c['fault']}, {c['phase']}, robot {c['robot']}: {c['why']}\n" for c in cases if c["unsafe"]]
+    return f"Unsafe:\n\n{''.join(named)}\n" if named else ""
+
+
+def population(options: argparse.Namespace) -> Part:
+    part = Part()
+    for robot, config in CONFIGS.items():
+        cases = of_population(config, POPULATION_FAULTS, options.robots)
+        unsafe = sum(c["unsafe"] for c in cases)
+        _, high = wilson(unsafe, len(cases))
+        part.rows.append(
+            (
+                f"{robot}: {len(POPULATION_FAULTS)} faults × 4 phases, {options.robots} imperfect robots",
+                "0 unsafe",
+                f"{len(cases)} cases, {unsafe} unsafe, share below {100 * high:.2f} % (95 %)",
+                unsafe == 0 < len(cases),
+            )
+        )
+        sound = of_population(
+            config, ["torn_packet"], options.robots
+        )  # no fault of a robot that does not use it
+        alarms = sum(c["disarmed"] or bool(c["degraded"]) or not c["upright"] for c in sound)
+        part.rows.append(
+            (
+                f"{robot}: sound imperfect robots",
+                "0 disarmed, 0 with a sensor left out",
+                f"{len(sound)} runs, {alarms} alarms",
+                alarms == 0 < len(sound),
+            )
+        )
+        part.section += (
+            f"## {robot}: imperfect robots\nFirst robot {HELD_OUT}, world of full fidelity. Ticks until the "
+        )
+        part.section += "motors were off or the part was left out, median / last.\n\n"
+        part.section += f"| fault | {' | '.join(PHASES)} |\n|---|{'---|' * len(PHASES)}\n"
+        for fault in POPULATION_FAULTS:
+            cells = [found([c for c in cases if (c["fault"], c["phase"]) == (fault, ph)]) for ph in PHASES]
+            part.section += f"| {fault} | {' | '.join(cells)} |\n"
+        part.section += "\n" + unsafe_ones(cases)
+    return part
