@@ -28,16 +28,14 @@ TEST_F(AdcTest, ReadsItsChannelOfTheNamedDevice) {
 
 TEST_F(AdcTest, DescriptorZeroIsOneLikeAnyOtherAndIsClosedOnce) {
   addAdc("TI-am335x-adc", 0);
-  const int before = openDescriptors();
-  {
-    const NoStdin none;
-    ASSERT_EQ(adc_open(&adc_, "TI-am335x-adc", 0), 0);
-    EXPECT_EQ(adc_.fd, 0);
-    adc_close(&adc_);
-  }
+  const NoStdin none;
+  ASSERT_EQ(adc_open(&adc_, "TI-am335x-adc", 0), 0);
+  EXPECT_EQ(adc_.fd, 0);
+  adc_close(&adc_);
   EXPECT_EQ(adc_.fd, -1);
   adc_close(&adc_);
-  EXPECT_EQ(openDescriptors(), before);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+  EXPECT_EQ(SyscallJournal::instance().strayCloses(), 0);
 }
 
 TEST_F(AdcTest, ReportsMissingDeviceAndChannel) {

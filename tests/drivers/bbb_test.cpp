@@ -253,19 +253,17 @@ TEST_F(BbbTest, TheNumberOfMotorsAndTheirFrequencyHaveBounds) {
 }
 
 TEST_F(BbbTest, LeavesNoDescriptorOpenWhetherItOpensOrNot) {
-  open();  // the emulated buses open what they keep
-  rio_close(&io_);
-  io_ = {};
-  const int before = openDescriptors();
+  const SyscallJournal& journal = SyscallJournal::instance();
   open();
-  EXPECT_GT(openDescriptors(), before);
+  EXPECT_GT(journal.openFiles(), 0);
   rio_close(&io_);
   io_ = {};
-  EXPECT_EQ(openDescriptors(), before);
+  EXPECT_EQ(journal.openFiles(), 0);
   imu.setWhoAmI(0x68);
   bbb_error_t error{};
   EXPECT_EQ(bbb_open(&config_, &io_, &error), -ENODEV);
-  EXPECT_EQ(openDescriptors(), before);
+  EXPECT_EQ(journal.openFiles(), 0);
+  EXPECT_EQ(journal.strayCloses(), 0);
 }
 
 TEST_F(BbbTest, EveryMissingPartIsNamedAndLeavesMotorsOff) {

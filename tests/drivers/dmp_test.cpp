@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 
+#include "syscall_journal.hpp"
 #include "testbed.hpp"
 
 namespace {

@@ -4,6 +4,7 @@
 
 #include <initializer_list>
 
+#include "syscall_journal.hpp"
 #include "testbed.hpp"
 
 namespace {
@@ -60,24 +61,24 @@ TEST_F(Mpu9250Test, TakesEveryRateAndRangeOfTheChipAndNoOther) {
 }
 
 TEST_F(Mpu9250Test, LeavesNoDescriptorOpenWhetherItOpensOrNot) {
-  ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);  // the emulated bus opens what it keeps
-  mpu9250_close(&chip_);
-  const int before = openDescriptors();
+  const SyscallJournal& journal = SyscallJournal::instance();
   ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);
+  EXPECT_EQ(journal.openFiles(), 1);
   mpu9250_close(&chip_);
-  EXPECT_EQ(openDescriptors(), before);
+  EXPECT_EQ(journal.openFiles(), 0);
   imu.setWhoAmI(0x68);
   EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -ENODEV);
-  EXPECT_EQ(openDescriptors(), before);
+  EXPECT_EQ(journal.openFiles(), 0);
   plain_i2c = false;
   EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -EOPNOTSUPP);
-  EXPECT_EQ(openDescriptors(), before);
+  EXPECT_EQ(journal.openFiles(), 0);
   plain_i2c = true;
   imu.setWhoAmI(0x71);
   const NoStdin none;
   ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);
   EXPECT_EQ(chip_.i2c.fd, 0);
   mpu9250_close(&chip_);
+  EXPECT_EQ(journal.strayCloses(), 0);
 }
 
 TEST_F(Mpu9250Test, TheFirstSampleIsNeverARepetition) {

@@ -10,6 +10,7 @@
 
 #include <string>
 
+#include "syscall_journal.hpp"
 #include "testbed.hpp"
 
 namespace {

@@ -1,6 +1,9 @@
 #include "syscall_journal.hpp"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <string.h>
 #include <unistd.h>
 
 #include <climits>
@@ -13,6 +16,8 @@ SyscallJournal& SyscallJournal::instance() {
 void SyscallJournal::clear() {
   lines_.clear();
   failures_.clear();
+  open_.clear();
+  stray_closes_ = 0;
 }
 
 void SyscallJournal::failRead(const std::string& path_end, int error, int times) {
@@ -52,9 +57,47 @@ std::string describe(const std::string& path, const void* data, size_t size) {
   while (!text.empty() && text.back() == '\n') text.pop_back();
   return (cut == std::string::npos ? path : path.substr(cut + 1)) + "=" + text;
 }
+
+int kept_stdin = -1;        // while a NoStdin lives: where standard input waits
+bool zero_is_node = false;  // and descriptor 0 is a device that umockdev emulates
 }  // namespace
 
 extern "C" {
+int __real_open64(const char* path, int flags, ...);
+int __real_close(int fd);
+
+int __wrap_open64(const char* path, int flags, ...) {
+  va_list rest;
+  va_start(rest, flags);
+  const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(rest, mode_t) : 0;
+  va_end(rest);
+  SyscallJournal& journal = SyscallJournal::instance();
+  const bool zero_is_free = kept_stdin >= 0 && !journal.isOpen(STDIN_FILENO);
+  // umockdev knows its nodes in /dev by the descriptor that they were opened with; the others can be moved to 0, which
+  // leaves no moment in which one of its threads could take 0.
+  const bool is_node = strncmp(path, "/dev/", 5) == 0;
+  if (zero_is_free && is_node) __real_close(STDIN_FILENO);
+  int fd = __real_open64(path, flags, mode);
+  const int error = errno;
+  if (zero_is_free && is_node && fd < 0) dup2(kept_stdin, STDIN_FILENO);
+  if (zero_is_free && !is_node && fd > 0) {
+    dup2(fd, STDIN_FILENO);
+    __real_close(fd);
+    fd = STDIN_FILENO;
+  }
+  if (fd == STDIN_FILENO) zero_is_node = is_node;
+  if (fd >= 0) journal.opened(fd);
+  errno = error;
+  return fd;
+}
+
+int __wrap_close(int fd) {
+  SyscallJournal::instance().closed(fd);
+  if (kept_stdin < 0 || fd != STDIN_FILENO) return __real_close(fd);
+  if (zero_is_node) __real_close(fd);
+  return dup2(kept_stdin, STDIN_FILENO) < 0 ? -1 : 0;
+}
+
 ssize_t __real_pread64(int fd, void* data, size_t size, off64_t at);
 ssize_t __real_pwrite64(int fd, const void* data, size_t size, off64_t at);
 
@@ -76,4 +119,15 @@ ssize_t __wrap_pwrite64(int fd, const void* data, size_t size, off64_t at) {
   SyscallJournal::instance().note(describe(path, data, size));
   return __real_pwrite64(fd, data, size, at);
 }
+}
+
+NoStdin::NoStdin() {
+  if (fcntl(STDIN_FILENO, F_GETFD) < 0) __real_open64("/dev/null", O_RDONLY);
+  kept_stdin = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 100);
+}
+
+NoStdin::~NoStdin() {
+  dup2(kept_stdin, STDIN_FILENO);
+  __real_close(kept_stdin);
+  kept_stdin = -1;
 }

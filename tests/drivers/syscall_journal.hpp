@@ -1,8 +1,9 @@
-// What the drivers wrote, in order, and system calls that fail on demand. In: nothing, it listens to pread
-// and pwrite (linked with --wrap) and to fake_gpio. Out: a journal of "name=value" lines. Not thread-safe:
-// one driver thread.
+// What the drivers wrote, in order, which files they hold open, and system calls that fail on demand. In: nothing, it
+// listens to open, close, pread and pwrite (linked with --wrap) and to fake_gpio. Out: a journal of "name=value" lines.
+// Not thread-safe: one driver thread.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,16 @@ class SyscallJournal {
   void failRead(const std::string& path_end, int error, int times = 1);
   void failWrite(const std::string& path_end, int error, int times = 1);
 
+  // Files opened and not closed by the drivers and the test, and closes of anything else. Descriptors of the emulated
+  // bus are not among them: its threads open and close theirs when they like.
+  int openFiles() const { return static_cast<int>(open_.size()); }
+  int strayCloses() const { return stray_closes_; }
+
+  // For the wrappers.
+  bool isOpen(int fd) const { return open_.count(fd) != 0; }
+  void opened(int fd) { open_.insert(fd); }
+  void closed(int fd) { stray_closes_ += open_.erase(fd) == 0 ? 1 : 0; }
+
   // For the wrappers: whether to fail, and with what.
   bool takeFailure(bool write, const std::string& path, int* error);
 
@@ -31,4 +42,15 @@ class SyscallJournal {
   };
   std::vector<std::string> lines_;
   std::vector<Failure> failures_;
+  std::set<int> open_;
+  int stray_closes_ = 0;
+};
+
+// A process that was started without standard input: the next file that it opens is descriptor 0.
+class NoStdin {
+ public:
+  NoStdin();
+  ~NoStdin();
+  NoStdin(const NoStdin&) = delete;
+  NoStdin& operator=(const NoStdin&) = delete;
 };

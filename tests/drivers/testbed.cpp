@@ -190,19 +190,3 @@ gboolean Testbed::onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpoin
   umockdev_ioctl_client_complete(client, result, failure);
   return TRUE;
 }
-
-NoStdin::NoStdin() : kept_(fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 100)) { close(STDIN_FILENO); }
-
-NoStdin::~NoStdin() {
-  dup2(kept_, STDIN_FILENO);
-  close(kept_);
-}
-
-int openDescriptors() {
-  int count = 0;
-  for (int fd = 0; fd < 1024; ++fd) {
-    struct stat status {};
-    count += fstat(fd, &status) == 0 && !S_ISSOCK(status.st_mode) ? 1 : 0;
-  }
-  return count;
-}

@@ -10,21 +10,6 @@
 
 #include "fake_imu.hpp"
 
-// While it lives, descriptor 0 is free: the next open returns it, which is no error.
-class NoStdin {
- public:
-  NoStdin();
-  ~NoStdin();
-  NoStdin(const NoStdin&) = delete;
-  NoStdin& operator=(const NoStdin&) = delete;
-
- private:
-  int kept_;
-};
-
-// Descriptors that this process has open, but for sockets: umockdev closes its own when it likes.
-int openDescriptors();
-
 class Testbed : public ::testing::Test {
  protected:
   Testbed();
