@@ -73,8 +73,8 @@ int __wrap_open64(const char* path, int flags, ...) {
   va_end(rest);
   SyscallJournal& journal = SyscallJournal::instance();
   const bool zero_is_free = kept_stdin >= 0 && !journal.isOpen(STDIN_FILENO);
-  // umockdev knows its nodes in /dev by the descriptor that they were opened with; the others can be moved to 0, which
-  // leaves no moment in which one of its threads could take 0.
+  // umockdev knows its nodes in /dev by the descriptor that they were opened with; the others can be moved to
+  // 0, which leaves no moment in which one of its threads could take 0.
   const bool is_node = strncmp(path, "/dev/", 5) == 0;
   if (zero_is_free && is_node) __real_close(STDIN_FILENO);
   int fd = __real_open64(path, flags, mode);

@@ -1,6 +1,6 @@
-// What the drivers wrote, in order, which files they hold open, and system calls that fail on demand. In: nothing, it
-// listens to open, close, pread and pwrite (linked with --wrap) and to fake_gpio. Out: a journal of "name=value" lines.
-// Not thread-safe: one driver thread.
+// What the drivers wrote, in order, which files they hold open, and system calls that fail on demand. In:
+// nothing, it listens to open, close, pread and pwrite (linked with --wrap) and to fake_gpio. Out: a journal
+// of "name=value" lines. Not thread-safe: one driver thread.
 #pragma once
 
 #include <set>
@@ -20,8 +20,8 @@ class SyscallJournal {
   void failRead(const std::string& path_end, int error, int times = 1);
   void failWrite(const std::string& path_end, int error, int times = 1);
 
-  // Files opened and not closed by the drivers and the test, and closes of anything else. Descriptors of the emulated
-  // bus are not among them: its threads open and close theirs when they like.
+  // Files opened and not closed by the drivers and the test, and closes of anything else. Descriptors of the
+  // emulated bus are not among them: its threads open and close theirs when they like.
   int openFiles() const { return static_cast<int>(open_.size()); }
   int strayCloses() const { return stray_closes_; }
 
