@@ -167,6 +167,20 @@ def test_law_lets_robots_be_told_apart_in_one_file(tmp_path):
     ]
 
 
+def test_law_lets_only_the_loop_call_a_tick(tmp_path):
+    call = "// p.tick(raw)\nconst auto result = p.tick(raw, command, clock);\n"
+    tree = planted(
+        tmp_path,
+        include__equipoise__runtime__loop_hpp=call,
+        src__app__log__replay_hpp=call,
+        tests__unit__a_test_cpp="wait_tick(&now);\npipeline->tick(raw);\n",
+    )
+    assert {(f.path, f.line) for f in law.law(tree)} == {
+        ("src/app/log/replay.hpp", 2),
+        ("tests/unit/a_test.cpp", 2),
+    }
+
+
 @pytest.mark.parametrize(
     "text",
     # Put together here, so that this file does not hold what it forbids.

@@ -108,17 +108,37 @@ class LoggedIo {
   std::exception_ptr failure_;
 };
 
+/// One logged tick after another as a hardware boundary, for a pipeline that follows the recorded run.
+class HandedOverIo {
+ public:
+  void hand_over(const runtime::TickRecord& tick) noexcept { now_ = &tick; }
+
+  int wait_tick(std::int64_t* now_ns) noexcept {
+    *now_ns = now_->now_ns;
+    return 0;
+  }
+  RawSample read() noexcept { return now_->raw; }
+  int write(const MotorCommand& /*command*/) noexcept { return 0; }
+  int motors_off() noexcept { return 0; }
+
+  const runtime::TickRecord& now() const noexcept { return *now_; }
+
+ private:
+  const runtime::TickRecord* now_ = nullptr;
+};
+
 /// What the runtime held against the motors, then.
+template <class Io>
 class LoggedSupervisor {
  public:
-  explicit LoggedSupervisor(const LoggedIo& io) : io_(io) {}
+  explicit LoggedSupervisor(const Io& io) : io_(io) {}
   std::uint32_t begin(std::int64_t /*now_ns*/, const RawSample& /*raw*/) noexcept {
     return io_.now().inhibit;
   }
   void end(bool /*driven*/, int /*write_error*/) noexcept {}
 
  private:
-  const LoggedIo& io_;
+  const Io& io_;
 };
 
 /// As the run judged it.
@@ -134,7 +154,7 @@ inline bool settled(const runtime::TickRecord& r) noexcept {
   return r.has_truth ? r.now_ns >= 5'000'000'000 : r.tick >= 1000;
 }
 
-/// `also(tick as logged, sample, command)` after each tick.
+/// `also(tick as logged)` after each tick.
 template <class Pipeline, class Also>
 Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other, Also&& also) {
   Replay out;
@@ -156,7 +176,7 @@ Replay replay(RunLog& log, Pipeline& pipeline, std::optional<std::size_t> other,
     expected = tick.tick + 1;
     record_tick(tick.tick, now_ns, raw, command, result, pipeline, &record);
     compare(tick, record, &out.difference);
-    also(tick, raw, command);
+    also(tick);
     judge.observe(judged(tick));
     if (!tick.has_truth || !settled(tick)) return;
     out.logged.add(tick.estimate, tick.truth);
@@ -198,12 +218,22 @@ Replay replay_retuned(RunLog& log, const typename P::Params& recorded, const typ
   follower.estimators().tap([&](auto* u, bool* held) { inputs.hand_on(u, held); });
   Retuned retuned;
   runtime::TickRecord record{};
-  const auto also = [&](const runtime::TickRecord& tick, const RawSample& raw, const Command& command) {
+  HandedOverIo io;
+  LoggedSupervisor supervisor(io);
+  runtime::LoopEnd end;
+  const auto commands = [&](std::int64_t, std::int64_t) {
     decltype(P::Result::x_hat) known;
-    if (tick.has_truth && recall(tick.truth, &known)) follower.estimators().observe_truth(known);
-    const auto result = follower.tick(raw, command, {tick.now_ns, tick.inhibit});
+    if (io.now().has_truth && recall(io.now().truth, &known)) follower.estimators().observe_truth(known);
+    return command_of(io.now());
+  };
+  const auto on_tick = [&](std::int64_t, std::int64_t now_ns, const RawSample& raw, const Command& command,
+                           const auto& result) {
+    record_tick(io.now().tick, now_ns, raw, command, result, follower, &record);
+  };
+  const auto also = [&](const runtime::TickRecord& tick) {
+    io.hand_over(tick);
+    runtime::run_tick(io, follower, commands, on_tick, supervisor, &end);
     inputs.begin();
-    record_tick(tick.tick, tick.now_ns, raw, command, result, follower, &record);
     if (settled(tick)) compare_tunings(tick, record, &retuned);
   };
   Replay out = replay(log, leader, std::nullopt, also);
@@ -223,7 +253,7 @@ Replay replay_as(RunLog& log, const std::string& origin, const Beside& beside = 
     complete<Firmware>(asked);
   }
   const std::string where = origin + " (its configuration)";
-  const auto nothing = [](const runtime::TickRecord&, const RawSample&, const Command&) {};
+  const auto nothing = [](const runtime::TickRecord&) {};
   choice.compare = beside.set.empty() && !beside.estimator.empty();
   const auto config = Firmware::apply(Firmware::parse(info.config_toml, where).config, choice);
   const std::optional<std::size_t> index =

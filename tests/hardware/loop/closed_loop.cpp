@@ -125,7 +125,7 @@ void PinWorld::show(const RawSample& raw) {
   bench_.setAdc(battery_channel_, static_cast<uint32_t>(std::lround(raw.battery_counts)));
 }
 
-void PinWorld::tick(bool data_ready) {
+void PinWorld::advance(bool data_ready) {
   const std::int64_t now_ns = equipoise::runtime::monotonic_now_ns();
   if (due_ns_ == 0) due_ns_ = now_ns;
   due_ns_ += kPeriod_ns;

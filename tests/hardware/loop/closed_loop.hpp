@@ -39,7 +39,7 @@ class PinWorld {
   ~PinWorld();
 
   /// Sleeps until the next tick, advances under what the pins say, shows the sensors.
-  void tick(bool data_ready = true);
+  void advance(bool data_ready = true);
 
   equipoise::MotorCommand pins() const;
   bool motorsOff() const;  // no pulse on any channel and the bridges asleep, from the kernel's side

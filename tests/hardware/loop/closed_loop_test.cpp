@@ -70,7 +70,7 @@ class ClosedLoop : public ::testing::TestWithParam<PinRobot> {
   void TearDown() override {
     if (child_ > 0) kill(child_, SIGKILL);
     // Nobody is left, not even the guard.
-    for (int i = 0; i < kTicksPerSecond && waitpid(-1, nullptr, WNOHANG) >= 0; ++i) world_->tick();
+    for (int i = 0; i < kTicksPerSecond && waitpid(-1, nullptr, WNOHANG) >= 0; ++i) world_->advance();
     EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1) << "a process outlived its robot";
     EXPECT_TRUE(world_->motorsOff());
   }
@@ -78,7 +78,7 @@ class ClosedLoop : public ::testing::TestWithParam<PinRobot> {
   void waitUntilArmed() {
     for (int i = 0; i < kToStart && world_->held(); ++i) {
       ASSERT_EQ(waitpid(child_, nullptr, WNOHANG), 0) << "the firmware did not start";
-      world_->tick();
+      world_->advance();
     }
     ASSERT_FALSE(world_->held()) << "never armed";
   }
@@ -86,7 +86,7 @@ class ClosedLoop : public ::testing::TestWithParam<PinRobot> {
   void balance(int ticks) {
     waitUntilArmed();
     for (int i = 0; i < ticks; ++i) {
-      world_->tick();
+      world_->advance();
       ASSERT_LT(world_->tilt_rad(), 0.5) << "fell in tick " << i;
       ASSERT_FALSE(world_->motorsOff()) << "gave up in tick " << i;
     }
@@ -96,7 +96,7 @@ class ClosedLoop : public ::testing::TestWithParam<PinRobot> {
   int ticksUntilOff(int at_most = 10, bool data_ready = true) {
     int ticks = 0;
     while (ticks < at_most && !world_->motorsOff()) {
-      world_->tick(data_ready);
+      world_->advance(data_ready);
       ++ticks;
     }
     EXPECT_EQ(world_->late(), 0) << "the world lost ticks";
@@ -106,7 +106,7 @@ class ClosedLoop : public ::testing::TestWithParam<PinRobot> {
   int terminated() {
     kill(child_, SIGTERM);
     int status = -1;
-    for (int i = 0; i < 2 * kTicksPerSecond && waitpid(child_, &status, WNOHANG) == 0; ++i) world_->tick();
+    for (int i = 0; i < 2 * kTicksPerSecond && waitpid(child_, &status, WNOHANG) == 0; ++i) world_->advance();
     if (!WIFEXITED(status)) return -1;
     child_ = -1;
     return WEXITSTATUS(status);
@@ -232,7 +232,7 @@ TEST_P(ClosedLoop, CoastsWithinThreeTicksOfBeingStopped) {
   EXPECT_LE(ticksUntilOff(), 3);
   kill(child_, SIGCONT);
   for (int i = 0; i < kTicksPerSecond / 2; ++i) {
-    world_->tick();
+    world_->advance();
     EXPECT_TRUE(world_->motorsOff()) << "it went on";
   }
 }

@@ -19,6 +19,7 @@ JOINS_STAGES = {
 # A robot composes stages; the application runs the whole.
 MAY_JOIN_STAGES = ("src/robots/", "src/app/", "src/main.cpp")
 JOINS_CORE_AND_DRIVERS = "src/app/"
+THE_LOOP = "include/equipoise/runtime/loop.hpp"
 # The C++ library's headers that reach the operating system, block, print or know the time.
 OS_HEADERS = re.compile(
     r"thread|mutex|shared_mutex|condition_variable|future|iostream|ostream|istream|fstream|sstream|iomanip"
@@ -118,5 +119,19 @@ def check_robot_switch(tree: Tree) -> list[Finding]:
     return [finding for finding in found if finding.path not in at_home[:1]]
 
 
+def check_one_loop(tree: Tree) -> list[Finding]:
+    """What is tested is what flies: only the loop calls a pipeline's tick."""
+    findings = []
+    for name in tree.ending(".cpp", ".hpp"):
+        if not name.startswith(("include/", "src/", "tests/")) or name == THE_LOOP:
+            continue
+        code = _COMMENT_OR_STRING.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), tree.text(name))
+        findings += [
+            Finding(name, code.count("\n", 0, match.start()) + 1, f"calls tick: only {THE_LOOP} does")
+            for match in re.finditer(r"(?:\.|->)tick\(", code)
+        ]
+    return findings
+
+
 def law(tree: Tree) -> list[Finding]:
-    return check_includes(tree) + check_robot_switch(tree)
+    return check_includes(tree) + check_robot_switch(tree) + check_one_loop(tree)
