@@ -2,7 +2,7 @@
 // a fraction of the instructions. P is an upper triangle packed by rows, so that it is symmetric by form; its
 // rows start at even columns, so that pairs are aligned.
 // In: input, measurements with a mask of those to use -> state, variances, normalised innovation.
-// Source: tools/derive/straight.py; docs/filter.md. RT-safe: fixed size, bounded.
+// Source: tools/derive/packed.py; docs/filter.md. RT-safe: fixed size, bounded.
 #pragma once
 
 #include <array>
