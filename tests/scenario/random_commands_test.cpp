@@ -1,5 +1,6 @@
 // Any command, suddenly: steps, reversals, full range, turning and driving at once. The governor makes each
-// feasible, so that no robot falls or is switched off. EQUIPOISE_COMMAND_SEQUENCES=1000: as many sequences.
+// feasible, so that no robot falls or is switched off. EQUIPOISE_COMMAND_SEQUENCES=1000: as many sequences;
+// EQUIPOISE_FIRST_SEQUENCE=1001: others than the first.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -13,10 +14,12 @@
 namespace equipoise {
 namespace {
 
-int sequences() {
-  const char* text = std::getenv("EQUIPOISE_COMMAND_SEQUENCES");
-  return text != nullptr ? std::atoi(text) : 20;
+int from_environment(const char* name, int otherwise) {
+  const char* text = std::getenv(name);
+  return text != nullptr ? std::atoi(text) : otherwise;
 }
+
+int sequences() { return from_environment("EQUIPOISE_COMMAND_SEQUENCES", 20); }
 
 struct Range {
   double speed_m_s;
@@ -97,14 +100,15 @@ int lost(const Trials& t) {
   const app::Choice choice{Firmware::kDefaultEstimator, t.controller, "full"};
   auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), t.set).config, choice);
   if (!t.governed) bypass_governor(config.reference);
+  const auto first = static_cast<std::uint64_t>(from_environment("EQUIPOISE_FIRST_SEQUENCE", 1));
   const auto losses = app::in_parallel<std::string>(
       "random commands", static_cast<std::size_t>(t.times * sequences()), app::threads_for(0),
-      [&](std::size_t i) { return loss<Firmware>(config, t, static_cast<std::uint64_t>(i) + 1); });
+      [&](std::size_t i) { return loss<Firmware>(config, t, first + i); });
   int count = 0;
   for (std::size_t i = 0; i < losses.size(); ++i) {
     if (losses[i].empty()) continue;
     ++count;
-    if (t.governed) std::printf("sequence %zu: %s\n", i + 1, losses[i].c_str());
+    if (t.governed) std::printf("sequence %zu: %s\n", static_cast<std::size_t>(first) + i, losses[i].c_str());
   }
   std::printf("%d of %d lost\n", count, t.times * sequences());
   return count;
