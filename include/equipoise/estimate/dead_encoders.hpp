@@ -1,8 +1,9 @@
 // Two encoders that stand still while the robot moves. One that lies is found by the filters
 // (wheel_isolation.hpp); without two they have nothing left to compare. Wheels of a sound robot stand still
-// together, too, held by stiction, for a second and more: then the body turns by less than 0.05 rad, or, once
-// in 30000 s of sudden commands, by 0.08 rad as one piece with its rolling ball. In: Measurement, the wheel
-// that is not used any more -> out: bits of the wheels. RT-safe.
+// together, too: held by stiction for a second and more, while the body tips by less than 0.05 rad, or, once
+// in 30000 s of sudden commands, by 0.08 rad as one piece with its rolling ball; or in a turn whose drive
+// cancels it at both, with the third turning as the yaw rate wants. In: Measurement, the wheel that is not
+// used any more -> out: bits of the wheels. RT-safe.
 #pragma once
 
 #include <array>
@@ -15,6 +16,9 @@ namespace equipoise {
 template <int Wheels>
 class DeadEncoders {
  public:
+  /// How far the body turns about z for each wheel's turn, on a ball that does not spin on the floor.
+  explicit DeadEncoders(const Vec<Wheels>& yaw_from_wheels) noexcept : yaw_from_wheels_(yaw_from_wheels) {}
+
   void reset() noexcept {
     known_ = false;
     for (Pair& pair : pairs_) pair = Pair{};
@@ -42,13 +46,12 @@ class DeadEncoders {
         for (std::size_t i = 0; i < 3 && z.imu_ok; ++i) {
           if (z.gyro_axis_ok[i]) pair.turned_rad[i] += kTickS * z.gyro_B_rad_s(static_cast<int>(i));
         }
-        pair.others_rad += moved.template lpNorm<1>();
-        const bool one_alone =
-            lost == a || lost == b;  // may stand still where its turning and driving cancel
+        pair.wheels_yaw_rad += yaw_from_wheels_.dot(moved);
+        const bool one_alone = lost == a || lost == b;  // what the lost one did is not known
         const bool tips = std::hypot(pair.turned_rad[0], pair.turned_rad[1]) > kTips_rad;
-        const bool yaws = std::abs(pair.turned_rad[2]) > (one_alone ? kYawsForOne_rad : kYaws_rad);
-        const bool others = !one_alone && pair.others_rad > kOthers_rad;
-        if (tips || yaws || others) dead_ |= 1U << a | 1U << b;
+        const bool yaws = one_alone ? std::abs(pair.turned_rad[2]) > kYawsForOne_rad
+                                    : std::abs(pair.turned_rad[2] - pair.wheels_yaw_rad) > kYaws_rad;
+        if (tips || yaws) dead_ |= 1U << a | 1U << b;
       }
     }
   }
@@ -61,13 +64,13 @@ class DeadEncoders {
   static constexpr double kTips_rad = 0.12;
   static constexpr double kYaws_rad = 0.2;
   static constexpr double kYawsForOne_rad = 2.2;
-  static constexpr double kOthers_rad = 1.0;
 
   struct Pair {
     std::array<double, 3> turned_rad{};  // body, since both stand still
-    double others_rad = 0.0;             // way of the other wheels
+    double wheels_yaw_rad = 0.0;         // what the other wheels say of its yaw
   };
 
+  Vec<Wheels> yaw_from_wheels_;
   std::array<Pair, static_cast<std::size_t>(Wheels*(Wheels - 1) / 2)> pairs_{};
   Vec<Wheels> angle_rad_ = Vec<Wheels>::Zero();
   bool known_ = false;

@@ -14,6 +14,13 @@ void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
   filter.update(u, y, use);
 }
 
+/// The ball does not spin about the vertical: the body does.
+Vec3 yaw_from_wheels(const MbbrKinematics& kinematics) {
+  Vec3 yaw;
+  for (int i = 0; i < 3; ++i) yaw(i) = -kinematics.ball_from_wheels(Vec3(Vec3::Unit(i))).z();
+  return yaw;
+}
+
 /// Torque between body and ball turns both: what it does to the body's rates per wheel rate.
 GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
   const MbbrEkfModel model(params.robot, params.ekf.disturbance_time_constant_s);
@@ -30,8 +37,7 @@ GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
       Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
   p.balances = {true, true, false};
   p.by_rate = {false, false, true};  // the ball does not spin about the vertical
-  for (int i = 0; i < 3; ++i)
-    p.rate_from_wheels(2, i) = -kinematics.ball_from_wheels(Vec3(Vec3::Unit(i))).z();
+  p.rate_from_wheels.row(2) = yaw_from_wheels(kinematics).transpose();
   return p;
 }
 
@@ -45,6 +51,7 @@ MbbrEstimators::MbbrEstimators(const Params& params)
       ekf_(params.robot, params.ekf),
       isolation_(ekf_),
       gyro_watch_(gyro_watch(params)),
+      dead_encoders_(yaw_from_wheels(kinematics_)),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(MbbrLinearModel(params.robot, params.kf_yaw_transport), params.kf) {}

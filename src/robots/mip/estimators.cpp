@@ -41,6 +41,7 @@ MipEstimators::MipEstimators(const Params& params)
       ekf_(params.robot, params.ekf),
       isolation_(ekf_, kPlay_rad),
       gyro_watch_(gyro_watch(params)),
+      dead_encoders_(Vec2(kinematics_.psi(Vec2::UnitX()), kinematics_.psi(Vec2::UnitY()))),
       ekf_published_(MipPublishedModel{}, params.ekf_published) {}
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {

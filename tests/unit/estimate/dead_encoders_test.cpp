@@ -6,6 +6,8 @@
 namespace equipoise {
 namespace {
 
+const Vec3 kYawFromWheels(-0.25, -0.25, -0.25);
+
 struct Motion {
   Vec3 gyro_rad_s = Vec3::Zero();
   Vec3 wheels_rad_s = Vec3::Zero();
@@ -13,7 +15,7 @@ struct Motion {
 
 /// Ticks until any encoder is called dead; 0: none.
 int found(const Motion& motion, int lost = -1, int ticks = 400) {
-  DeadEncoders<3> watch;
+  DeadEncoders<3> watch(kYawFromWheels);
   Measurement<3> z;
   z.imu_ok = z.encoders_ok = true;
   z.gyro_B_rad_s = motion.gyro_rad_s;
@@ -41,8 +43,13 @@ TEST(DeadEncoders, OneAloneIsNotItsBusiness) {
 }
 
 TEST(DeadEncoders, TheThirdWheelDoesNotTurnAlone) {
-  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.0)}), 41);    // 1 rad
-  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.0)}, 0), 0);  // one of the two is known to be dead
+  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}), 33);    // 0.2 rad of yaw that is not there
+  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}, 0), 0);  // one of the two is known to be dead
+}
+
+TEST(DeadEncoders, InATurnWhoseDriveCancelsItAtTwoWheelsTheThirdTurnsAlone) {
+  EXPECT_EQ(found({Vec3(0.0, 0.0, -4.0), Vec3(16.0, 0.0, 0.0)}), 0);
+  EXPECT_NE(found({Vec3(0.0, 0.0, -12.0), Vec3(16.0, 0.0, 0.0)}), 0);  // a third of the turn: two are dead
 }
 
 TEST(DeadEncoders, BesideALostOneAWheelMayStandStillInATurnForAWhile) {
@@ -51,7 +58,7 @@ TEST(DeadEncoders, BesideALostOneAWheelMayStandStillInATurnForAWhile) {
 }
 
 TEST(DeadEncoders, ACountStartsTheWatchAnew) {
-  DeadEncoders<3> watch;
+  DeadEncoders<3> watch(kYawFromWheels);
   Measurement<3> z;
   z.imu_ok = z.encoders_ok = true;
   z.gyro_B_rad_s = Vec3(0.5, 0.0, 0.0);
@@ -63,7 +70,7 @@ TEST(DeadEncoders, ACountStartsTheWatchAnew) {
 }
 
 TEST(DeadEncoders, NamesBoth) {
-  DeadEncoders<3> watch;
+  DeadEncoders<3> watch(kYawFromWheels);
   Measurement<3> z;
   z.imu_ok = z.encoders_ok = true;
   z.gyro_B_rad_s = Vec3(0.0, 0.0, 6.3);
