@@ -240,3 +240,11 @@ def test_bench_measures_the_fewest_wakes_it_offers(binary, root):
     assert [wake[way]["wakes"] for way in ("loop", "clock_nanosleep")] == [10, 10]
     for way in wake.values():
         assert 0 <= way["p50_us"] <= way["p99_us"] <= way["max_us"]
+
+
+@pytest.mark.parametrize("option", ["--fault", "--phase"])
+def test_a_campaign_of_no_such_case_is_refused(binary, root, option):
+    done = run(binary, "campaign", "--config", root / "config/mbbr.toml", option, "nonesuch")
+    assert done.returncode == 2
+    assert option in done.stderr
+    assert "nonesuch" in done.stderr

@@ -273,8 +273,10 @@ void add_campaign(Subcommand app) {
   command.option("--fidelity", a->fidelity, "of the world").show_default();
   command.option("--robot", a->robot, "of the population, the first; 0: the typical one").show_default();
   command.option("--robots", a->robots, "of the population").show_default().range(1, 100000);
-  command.option("--fault", a->faults, "only these");
-  command.option("--phase", a->phases, "only these");
+  std::vector<std::string> faults;
+  for (const FaultInfo& fault : kFaults) faults.emplace_back(fault.name);
+  command.option("--fault", a->faults, "only these").one_of(faults);
+  command.option("--phase", a->phases, "only these").one_of({kPhaseNames.begin(), kPhaseNames.end()});
   command.option("--set", a->set, "override a configuration key");
   command.option("--jobs", a->jobs, "threads; 0: one per core. The results do not depend on it")
       .show_default()
