@@ -39,7 +39,7 @@ class Twist {
       watch_.screen(z, omega);
       GyroWitness<3> witness;
       witness.accel_nis = accel_nis;
-      witness.blames_wheel = blames_wheel;
+      witness.blamed_wheel = blames_wheel ? 0 : -1;
       witness.wheel_stands = wheel_stands;
       watch_.compare(z, witness);
       if (!watch_.trusted()) return i + 1;
