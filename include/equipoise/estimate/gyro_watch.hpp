@@ -19,10 +19,10 @@ namespace equipoise {
 template <int Wheels>
 struct GyroWatchParams {
   Mat<3, Wheels> from_wheels =
-      Mat<3, Wheels>::Zero();                      // change of body rate per change of wheel rate, by torque
-  Vec3 sigma_rad_s = Vec3::Ones();                 // of what is left of a change over three ticks
-  Vec3 slow_sigma_rad_s = Vec3::Zero();  // the same over six ticks; zero: encoders are blamed unexamined
-  Vec3 max_step_rad_s = Vec3::Constant(2.0);       // of a rate against what was expected
+      Mat<3, Wheels>::Zero();                 // change of body rate per change of wheel rate, by torque
+  Vec3 sigma_rad_s = Vec3::Ones();            // of what is left of a change over three ticks
+  Vec3 slow_sigma_rad_s = Vec3::Zero();       // the same over six ticks; zero: encoders are blamed unexamined
+  Vec3 max_step_rad_s = Vec3::Constant(2.0);  // of a rate against what was expected
   std::array<bool, 3> balances{true, true, true};  // axes without which the robot falls
   // Axes whose rate is known without a torque: `rate_from_wheels` times the wheels' rates and what the filter
   // adds.
@@ -295,6 +295,7 @@ class GyroWatch {
     if (p_.slow_sigma_rad_s.isZero(0.0) || !examined_[0] || !examined_[1] || !examined_[2]) return;
     const Seen s = seen(kSlowHalf, witness);
     const double as_is = misfit(s.change, s.mean, s, p_.slow_sigma_rad_s);
+    if (as_is <= kDoubt && !weighs_) return;  // nor would it be more with what follows
     Odds lies;
     for (std::size_t k = 0; k < kTakenForAnEncoder.size(); ++k) {
       const Lie& lie = kLies[kTakenForAnEncoder[k]];
@@ -302,10 +303,12 @@ class GyroWatch {
     }
     lies = lies.cwiseMin(kMostOfAWeighing);
     const Vec3 left = (s.change - s.by_wheels).cwiseQuotient(p_.slow_sigma_rad_s);
+    weighs_ = false;
     for (int i = 0; i < Wheels; ++i) {
       const double encoder = std::min(as_is, with_another_wheel(left, p_.slow_sigma_rad_s, i));
       Odds& odds = swapped_[static_cast<std::size_t>(i)];
       odds = (odds + Odds::Constant(std::min(encoder, kMostOfAWeighing) - kDoubt) - lies).cwiseMax(0.0);
+      weighs_ = weighs_ || odds.maxCoeff() > 0.0;
     }
   }
 
@@ -357,7 +360,9 @@ class GyroWatch {
   int without_ = 0;
   int settling_ = 0;  // ticks left
   double evidence_ = 0.0;
-  std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_{};  // per lie, against that wheel's encoder
+  // Per lie, against that wheel's encoder; is one of them more than zero?
+  std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_{};
+  bool weighs_ = false;
   int contradicted_ = 0;    // ticks in a row
   int mirrored_ = 0;        // ticks in a row
   Lie nearest_ = kLies[0];  // that explains most

@@ -32,7 +32,7 @@ GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
   const Mat3 body = B.middleRows<3>(MbbrEkfModel::kThetaDotX);
   GyroWatchParams<3> p;
   p.from_wheels = body * wheels.inverse();
-  p.sigma_rad_s = {0.045, 0.045, 0.18};  // encoder counts, gravity, play: measured on robots 1 to 8
+  p.sigma_rad_s = {0.045, 0.045, 0.18};     // encoder counts, gravity, play: measured on robots 1 to 8
   p.slow_sigma_rad_s = {0.03, 0.03, 0.13};  // robots 1 to 100, 301 to 350, 451 to 500
   p.max_step_rad_s =
       Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
