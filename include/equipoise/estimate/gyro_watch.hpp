@@ -19,9 +19,10 @@ namespace equipoise {
 template <int Wheels>
 struct GyroWatchParams {
   Mat<3, Wheels> from_wheels =
-      Mat<3, Wheels>::Zero();                      // change of body rate per change of wheel rate, by torque
-  Vec3 sigma_rad_s = Vec3::Ones();                 // of what is left of a change over three ticks
-  Vec3 max_step_rad_s = Vec3::Constant(2.0);       // of a rate against what was expected
+      Mat<3, Wheels>::Zero();                 // change of body rate per change of wheel rate, by torque
+  Vec3 sigma_rad_s = Vec3::Ones();            // of what is left of a change over three ticks
+  Vec3 slow_sigma_rad_s = Vec3::Zero();       // the same over six ticks; zero: encoders are blamed unexamined
+  Vec3 max_step_rad_s = Vec3::Constant(2.0);  // of a rate against what was expected
   std::array<bool, 3> balances{true, true, true};  // axes without which the robot falls
   // Axes whose rate is known without a torque: `rate_from_wheels` times the wheels' rates and what the filter
   // adds.
@@ -36,7 +37,7 @@ struct GyroWitness {
   double accel_nis = 0.0;  // normalised innovation of the accelerometer's rows, summed
   // What the wheels' rates change without a torque, because the robot turns and its ball rolls straight on.
   Vec<Wheels> carried_rad_s2 = Vec<Wheels>::Zero();
-  bool blames_wheel = false;       // one is not used any more
+  int blamed_wheel = -1;           // is not used any more; -1: none
   bool wheel_stands = false;       // it, since long: that is no fault of the gyro
   Vec3 rate_rad_s = Vec3::Zero();  // of the axes `by_rate`, added to what the wheels say
 };
@@ -55,6 +56,7 @@ class GyroWatch {
     without_ = 0;
     settling_ = 0;
     evidence_ = 0.0;
+    for (Odds& odds : swapped_) odds = Odds::Zero();
     contradicted_ = 0;
     mirrored_ = 0;
     listened_ = 0;
@@ -109,21 +111,27 @@ class GyroWatch {
     if (!z.imu_ok || !z.encoders_ok || z.ticks > 1 || returns) {
       samples_ = 0;
       evidence_ = 0.0;
+      for (Odds& odds : swapped_) odds = Odds::Zero();
       contradicted_ = 0;
       if (z.ticks > kStall) settling_ = kSettling;
       return;
     }
     settling_ = std::max(settling_ - 1, 0);
-    latest_ = latest_ > 0 ? latest_ - 1 : kSpan - 1;
-    gyro_[latest_] = gyro_[latest_ + kSpan] = z.gyro_B_rad_s;
-    angle_[latest_] = angle_[latest_ + kSpan] = z.wheel_angle_rad;
-    samples_ = std::min(samples_ + 1, static_cast<int>(kSpan));
-    const bool examined = samples_ == static_cast<int>(kSpan) && accel_nis_ < kPushed && settling_ == 0;
+    latest_ = latest_ > 0 ? latest_ - 1 : kKept - 1;
+    gyro_[latest_] = gyro_[latest_ + kKept] = z.gyro_B_rad_s;
+    angle_[latest_] = angle_[latest_ + kKept] = z.wheel_angle_rad;
+    samples_ = std::min(samples_ + 1, static_cast<int>(kKept));
+    const bool calm = accel_nis_ < kPushed && settling_ == 0;
+    const bool examined = samples_ >= static_cast<int>(span(kHalf)) && calm;
     const Verdict verdict = examined ? judge(witness) : Verdict{};
     evidence_ = verdict.lies ? evidence_ + std::min(verdict.surprise, kMostOfATick) : 0.0;
     contradicted_ = verdict.unexplained > kContradiction ? contradicted_ + 1 : 0;
     if (contradicted_ >= kContradicted) trusted_ = false;
-    if (evidence_ > (witness.blames_wheel ? kProofOfAnError : kProof)) condemn(nearest_);
+    const bool blames_wheel = witness.blamed_wheel >= 0;
+    if (evidence_ > (blames_wheel ? kProofOfAnError : kProof)) condemn(nearest_);
+    if (samples_ == static_cast<int>(kKept) && calm && !witness.wheel_stands) weigh(witness);
+    if (blames_wheel && swapped_[static_cast<std::size_t>(witness.blamed_wheel)].maxCoeff() > kRather)
+      trusted_ = false;
   }
 
   bool trusted() const noexcept { return trusted_; }
@@ -132,13 +140,19 @@ class GyroWatch {
 
  private:
   static constexpr std::size_t kHalf = 3;  // ticks: what happened in the last three against the three before
-  static constexpr std::size_t kSpan = 2 * kHalf + 1;
+  // Swapped axes look like an encoder that counts wrongly within so few ticks; twice as many tell them apart.
+  static constexpr std::size_t kSlowHalf = 6;
+  static constexpr std::size_t span(std::size_t half) noexcept { return 2 * half + 1; }
+  static constexpr std::size_t kKept = span(kSlowHalf);
   static constexpr double kSurprise = 60.0;        // squared, in sigmas
   static constexpr double kMostOfATick = 120.0;    // a tick more is needed, whatever the last one says
   static constexpr double kProof = 239.0;          // sum over consecutive ticks: two of the most and a little
   static constexpr double kContradiction = 150.0;  // that no encoder explains; sound robots stay below 80
   static constexpr int kContradicted = 3;          // ticks
   static constexpr double kProofOfAnError = 500.0;
+  static constexpr double kMostOfAWeighing = 100.0;
+  static constexpr double kDoubt = 4.0;      // a tick, for the encoder
+  static constexpr double kRather = 30.0;    // swapped axes; lying encoders of robots 301 to 350: below 18
   static constexpr double kExplains = 0.25;  // of the surprise is left with another gyro
   static constexpr double kScale = 0.05;     // error of a rate by the wheels: radii, rollers
   static constexpr double kMount = 0.015;    // rad, of the IMU: what an axis sees of the others
@@ -182,6 +196,10 @@ class GyroWatch {
                                              {1, 2, -1.0},
                                              {2, 0, -1.0}}};
 
+  /// Those that swap the vertical with another, which is what the encoders are compared with.
+  static constexpr std::array<std::size_t, 4> kTakenForAnEncoder{4, 5, 7, 8};
+  using Odds = Vec<static_cast<int>(kTakenForAnEncoder.size())>;
+
   /// An axis that balances does not lie twice; others can be done without.
   void condemn(const Lie& lie) noexcept {
     const auto i = static_cast<std::size_t>(lie.i);
@@ -223,14 +241,75 @@ class GyroWatch {
   }
 
   /// One wheel's encoder may lie instead: what it says is free then.
-  double with_another_wheel(const Vec3& left) const noexcept {
-    double least = kLargest * kLargest;
-    for (int i = 0; i < Wheels; ++i) {
-      const Vec3 a = p_.from_wheels.col(i).cwiseQuotient(p_.sigma_rad_s);
-      const double share = a.dot(left);
-      least = std::min(least, left.squaredNorm() - share * share / std::max(a.squaredNorm(), 1e-12));
+  double with_another_wheel(const Vec3& left, const Vec3& sigma_rad_s, int wheel) const noexcept {
+    const Vec3 a = p_.from_wheels.col(wheel).cwiseQuotient(sigma_rad_s);
+    const double share = a.dot(left);
+    return left.squaredNorm() - share * share / std::max(a.squaredNorm(), 1e-12);
+  }
+
+  /// Of the latest ticks, and what changed since as many before.
+  struct Seen {
+    Vec3 mean = Vec3::Zero();  // by the gyro
+    Vec3 change = Vec3::Zero();
+    Vec3 by_wheels = Vec3::Zero();  // change
+    Vec3 rate = Vec3::Zero();       // by the wheels
+  };
+
+  Seen seen(std::size_t half, const GyroWitness<Wheels>& witness) const noexcept {
+    const Vec3* const gyro = &gyro_[latest_];
+    const Vec<Wheels>* const angle = &angle_[latest_];
+    const double share = 1.0 / static_cast<double>(half);
+    const double half_s = static_cast<double>(half) * kTickS;
+    Seen s;
+    Vec3 before = Vec3::Zero();
+    for (std::size_t i = 0; i < half; ++i) {
+      s.mean += gyro[i];
+      before += gyro[half + i];
     }
-    return least;
+    s.mean *= share;
+    s.change = s.mean - share * before;
+    const Vec<Wheels> turned = angle[0] - 2.0 * angle[half] + angle[2 * half];
+    s.by_wheels = p_.from_wheels * (turned / half_s - half_s * witness.carried_rad_s2);
+    s.rate = p_.rate_from_wheels * ((angle[0] - angle[half]) / half_s).eval() + witness.rate_rad_s;
+    return s;
+  }
+
+  /// Gyro against wheels, squared, in sigmas.
+  double misfit(const Vec3& change, const Vec3& mean, const Seen& s, const Vec3& sigma_rad_s) const noexcept {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<int>(i);
+      if (!examined_[i]) continue;
+      const double left = p_.by_rate[i] ? mean(axis) - s.rate(axis) : change(axis) - s.by_wheels(axis);
+      const double sigma =
+          p_.by_rate[i] ? p_.rate_sigma_rad_s(axis) + kScale * std::abs(s.rate(axis)) + kMount * mean.norm()
+                        : sigma_rad_s(axis);
+      sum += left * left / (sigma * sigma);
+    }
+    return sum;
+  }
+
+  /// Is it rather the gyro than the encoder? Also before an encoder is blamed: a robot that is balanced with
+  /// the wrong sensors hardly turns its wheels later.
+  void weigh(const GyroWitness<Wheels>& witness) noexcept {
+    if (p_.slow_sigma_rad_s.isZero(0.0) || !examined_[0] || !examined_[1] || !examined_[2]) return;
+    const Seen s = seen(kSlowHalf, witness);
+    const double as_is = misfit(s.change, s.mean, s, p_.slow_sigma_rad_s);
+    if (as_is <= kDoubt && !weighs_) return;  // nor would it be more with what follows
+    Odds lies;
+    for (std::size_t k = 0; k < kTakenForAnEncoder.size(); ++k) {
+      const Lie& lie = kLies[kTakenForAnEncoder[k]];
+      lies(static_cast<int>(k)) = misfit(lie(s.change), lie(s.mean), s, p_.slow_sigma_rad_s);
+    }
+    lies = lies.cwiseMin(kMostOfAWeighing);
+    const Vec3 left = (s.change - s.by_wheels).cwiseQuotient(p_.slow_sigma_rad_s);
+    weighs_ = false;
+    for (int i = 0; i < Wheels; ++i) {
+      const double encoder = std::min(as_is, with_another_wheel(left, p_.slow_sigma_rad_s, i));
+      Odds& odds = swapped_[static_cast<std::size_t>(i)];
+      odds = (odds + Odds::Constant(std::min(encoder, kMostOfAWeighing) - kDoubt) - lies).cwiseMax(0.0);
+      weighs_ = weighs_ || odds.maxCoeff() > 0.0;
+    }
   }
 
   struct Verdict {
@@ -240,60 +319,39 @@ class GyroWatch {
   };
 
   Verdict judge(const GyroWitness<Wheels>& witness) noexcept {
-    static_assert(kHalf == 3);
-    constexpr double kShare = 1.0 / static_cast<double>(kHalf);
-    const Vec3* const gyro = &gyro_[latest_];
-    const Vec<Wheels>* const angle = &angle_[latest_];
-    const Vec3 mean = kShare * (gyro[0] + gyro[1] + gyro[2]);
-    const Vec3 change = mean - kShare * (gyro[3] + gyro[4] + gyro[5]);
-    constexpr double kHalf_s = static_cast<double>(kHalf) * kTickS;
-    const Vec<Wheels> turned = angle[0] - 2.0 * angle[kHalf] + angle[2 * kHalf];
-    const Vec3 by_wheels = p_.from_wheels * (turned / kHalf_s - kHalf_s * witness.carried_rad_s2);
-    const Vec3 rate = p_.rate_from_wheels * ((angle[0] - angle[kHalf]) / kHalf_s).eval() + witness.rate_rad_s;
-    const auto against = [&](const Vec3& changed, const Vec3& turns) {
-      double sum = 0.0;
-      for (std::size_t i = 0; i < 3; ++i) {
-        const auto axis = static_cast<int>(i);
-        if (!examined_[i]) continue;
-        const double left = p_.by_rate[i] ? turns(axis) - rate(axis) : changed(axis) - by_wheels(axis);
-        const double sigma =
-            p_.by_rate[i] ? p_.rate_sigma_rad_s(axis) + kScale * std::abs(rate(axis)) + kMount * turns.norm()
-                          : p_.sigma_rad_s(axis);
-        sum += left * left / (sigma * sigma);
-      }
-      return sum;
-    };
-    const double as_is = against(change, mean);
+    const Seen s = seen(kHalf, witness);
+    const double as_is = misfit(s.change, s.mean, s, p_.sigma_rad_s);
     Verdict verdict;
     if (!(as_is > kSurprise)) return verdict;
     double other = kLargest * kLargest;
     for (const Lie& lie : kLies) {
       if (!examined_[static_cast<std::size_t>(lie.i)] || !examined_[static_cast<std::size_t>(lie.k)])
         continue;
-      const double left = against(lie(change), lie(mean));
+      const double left = misfit(lie(s.change), lie(s.mean), s, p_.sigma_rad_s);
       if (left < other) nearest_ = lie;
       other = std::min(other, left);
     }
-    Vec3 left = (change - by_wheels).cwiseQuotient(p_.sigma_rad_s);
+    Vec3 left = (s.change - s.by_wheels).cwiseQuotient(p_.sigma_rad_s);
     for (std::size_t i = 0; i < 3; ++i) {
       const auto axis = static_cast<int>(i);
       if (p_.by_rate[i] && p_.rate_from_wheels.row(axis).isZero(0.0))  // no wheel turns about it
-        left(axis) = (mean(axis) - rate(axis)) / p_.rate_sigma_rad_s(axis);
+        left(axis) = (s.mean(axis) - s.rate(axis)) / p_.rate_sigma_rad_s(axis);
       if (!examined_[i]) left(axis) = 0.0;
     }
-    const double wheel = with_another_wheel(left);
+    double wheel = kLargest * kLargest;
+    for (int i = 0; i < Wheels; ++i) wheel = std::min(wheel, with_another_wheel(left, p_.sigma_rad_s, i));
     verdict.surprise = as_is;
     verdict.lies = other < kExplains * as_is && other < wheel;
     const bool rightly = witness.wheel_stands || wheel < kExplains * kSurprise;
-    if (witness.blames_wheel && rightly) verdict.lies = false;
+    if (witness.blamed_wheel >= 0 && rightly) verdict.lies = false;
     verdict.unexplained = std::min(as_is, wheel);
     return verdict;
   }
 
   GyroWatchParams<Wheels> p_;
-  // The latest kSpan samples from `latest_` on, latest first; each is written twice, so that none is moved.
-  std::array<Vec3, 2 * kSpan> gyro_{};
-  std::array<Vec<Wheels>, 2 * kSpan> angle_{};
+  // The latest kKept samples from `latest_` on, latest first; each is written twice, so that none is moved.
+  std::array<Vec3, 2 * kKept> gyro_{};
+  std::array<Vec<Wheels>, 2 * kKept> angle_{};
   std::size_t latest_ = 0;
   std::array<bool, 3> examined_{true, true, true};  // axes
   int samples_ = 0;
@@ -302,6 +360,9 @@ class GyroWatch {
   int without_ = 0;
   int settling_ = 0;  // ticks left
   double evidence_ = 0.0;
+  // Per lie, against that wheel's encoder; is one of them more than zero?
+  std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_{};
+  bool weighs_ = false;
   int contradicted_ = 0;    // ticks in a row
   int mirrored_ = 0;        // ticks in a row
   Lie nearest_ = kLies[0];  // that explains most

@@ -32,7 +32,8 @@ GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
   const Mat3 body = B.middleRows<3>(MbbrEkfModel::kThetaDotX);
   GyroWatchParams<3> p;
   p.from_wheels = body * wheels.inverse();
-  p.sigma_rad_s = {0.045, 0.045, 0.18};  // encoder counts, gravity, play: measured on robots 1 to 8
+  p.sigma_rad_s = {0.045, 0.045, 0.18};     // encoder counts, gravity, play: measured on robots 1 to 8
+  p.slow_sigma_rad_s = {0.03, 0.03, 0.13};  // robots 1 to 100, 301 to 350, 451 to 500
   p.max_step_rad_s =
       Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
   p.balances = {true, true, false};
@@ -120,7 +121,7 @@ void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   dead_encoders_.update(believed, isolation_.lost());
   const Vec2 carried = x.theta_dot.z() * Vec2(x.phi_dot_star.y(), -x.phi_dot_star.x());
   GyroWitness<Mbbr::kWheels> witness;
-  witness.blames_wheel = isolation_.lost() >= 0;
+  witness.blamed_wheel = isolation_.lost();
   witness.wheel_stands = isolation_.stands_still();
   witness.accel_nis = ekf_.row_nis()[MbbrEkfModel::kAccel] + ekf_.row_nis()[MbbrEkfModel::kAccel + 1];
   witness.carried_rad_s2 = kinematics_.wheels_from_ball(Vec3(carried.x(), carried.y(), 0.0));

@@ -141,7 +141,7 @@ void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   bias_drift_.update(ekf_.x().segment<1>(MipEkfModel::kGyroBias), 0.0);
   dead_encoders_.update(believed, isolation_.lost());
   GyroWitness<Mip::kWheels> witness;
-  witness.blames_wheel = isolation_.lost() >= 0;
+  witness.blamed_wheel = isolation_.lost();
   witness.wheel_stands = isolation_.stands_still();
   witness.accel_nis = ekf_.row_nis()[MipEkfModel::kAccelY];
   witness.rate_rad_s.y() = expected_rad_s.y();

@@ -13,7 +13,7 @@ namespace {
 /// the body's.
 class Twist {
  public:
-  Twist() : watch_(params()) {}
+  explicit Twist(const GyroWatchParams<3>& p = params()) : watch_(p) {}
 
   static GyroWatchParams<3> params() {
     GyroWatchParams<3> p;
@@ -36,10 +36,11 @@ class Twist {
       z.gyro_B_rad_s = lie(omega);
       angle_ += kTickS * params().from_wheels.inverse() * omega;
       z.wheel_angle_rad = angle_;
+      if (counts_backwards) z.wheel_angle_rad(0) *= -1.0;
       watch_.screen(z, omega);
       GyroWitness<3> witness;
       witness.accel_nis = accel_nis;
-      witness.blames_wheel = blames_wheel;
+      witness.blamed_wheel = blames_wheel ? 0 : -1;
       witness.wheel_stands = wheel_stands;
       watch_.compare(z, witness);
       if (!watch_.trusted()) return i + 1;
@@ -49,6 +50,7 @@ class Twist {
   const GyroWatch<3>& watch() const { return watch_; }
   bool blames_wheel = false;
   bool wheel_stands = false;
+  bool counts_backwards = false;  // the wheel that is blamed
   double amplitude = 1.0;
   double tempo = 1.0;
 
@@ -124,6 +126,44 @@ TEST(GyroWatchTest, ABlamedWheelThatStandsStillIsNoFaultOfTheGyro) {
   ASSERT_EQ(turns.run(truth), 0);
   EXPECT_GT(turns.run(flipped), 0);
   EXPECT_EQ(stands.run(flipped), 0);
+}
+
+/// So gently that no three ticks of it say anything.
+Twist sway(double slow_sigma_rad_s) {
+  GyroWatchParams<3> p = Twist::params();
+  p.slow_sigma_rad_s = Vec3::Constant(slow_sigma_rad_s);
+  Twist twist(p);
+  twist.amplitude = 0.1;
+  return twist;
+}
+
+Vec3 swapped_yz(const Vec3& omega) { return {omega.x(), omega.z(), omega.y()}; }
+
+TEST(GyroWatchTest, SwappedAxesThatWereTakenForAnEncoderAreTheGyroAtOnce) {
+  Twist robot = sway(0.01);
+  ASSERT_EQ(robot.run(truth), 0);
+  EXPECT_EQ(robot.run(swapped_yz), 0);  // nobody else is blamed for it yet
+  robot.blames_wheel = true;
+  EXPECT_EQ(robot.run(truth), 1);  // what was seen before counts
+  Twist unexamined = sway(0.0);
+  unexamined.blames_wheel = true;
+  EXPECT_EQ(unexamined.run(swapped_yz), 0);
+}
+
+TEST(GyroWatchTest, AnEncoderThatCountsBackwardsIsNoSwapOfAxes) {
+  Twist robot = sway(0.01);
+  ASSERT_EQ(robot.run(truth), 0);
+  robot.counts_backwards = true;
+  EXPECT_EQ(robot.run(truth, 2.0, 20), 0);
+  robot.blames_wheel = true;
+  EXPECT_EQ(robot.run(truth, 2.0, 2000), 0);
+}
+
+TEST(GyroWatchTest, WhileTheBlamedWheelStandsOnlyWhatWasSeenBeforeCounts) {
+  Twist robot = sway(0.01);
+  ASSERT_EQ(robot.run(truth), 0);
+  robot.blames_wheel = robot.wheel_stands = true;
+  EXPECT_EQ(robot.run(swapped_yz), 0);
 }
 
 TEST(GyroWatchTest, WhatNoEncoderExplainsIsTheGyroAlsoWhereNoLieFits) {
