@@ -197,8 +197,7 @@ void add_remote(Subcommand app) {
           .subcommand("lines",
                       "What the hand does, as the lines that send --live takes: for a remote at another "
                       "machine than the robot")
-          .example(
-              "equipoise remote lines config/remotes/gamepad.toml | equipoise send --live --key anna.key");
+          .example("equipoise remote lines config/remotes/gamepad.toml");
   say.option("file", *path, "the remote, TOML; see config/remotes").file().required();
   say.action([=] { return lines(*path); });
 }
