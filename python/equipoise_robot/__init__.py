@@ -1,6 +1,7 @@
 """Equipoise's simulator, design and logs in Python: balancing robots, in process."""
 
 from importlib import import_module as _import_module
+from importlib.util import find_spec as _find_spec
 from pkgutil import extend_path as _extend_path
 from typing import TYPE_CHECKING, Any
 
@@ -60,7 +61,7 @@ def __dir__() -> list[str]:
 
 
 def register_envs() -> None:
-    """The environments by id. Gymnasium calls this by itself where the package is installed."""
+    """The environments by id. Importing the package calls it where Gymnasium is installed."""
     from gymnasium.envs.registration import register, registry
 
     for name, robot in {"Mbbr": "mbbr", "Mip": "mip"}.items():
@@ -72,3 +73,7 @@ def register_envs() -> None:
                 kwargs={"robot": robot},
                 max_episode_steps=2000,
             )
+
+
+if _find_spec("gymnasium") is not None:
+    register_envs()

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core, register_envs
+from . import _core
 from ._data import need
 from .simulation import request
 
@@ -25,8 +25,6 @@ import gymnasium  # noqa: E402
 from gymnasium.utils.seeding import np_random  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 from gymnasium.vector.utils import batch_space  # noqa: E402
-
-register_envs()
 
 Array = NDArray[np.float64]
 TICK_HZ = 200

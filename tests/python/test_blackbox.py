@@ -321,6 +321,27 @@ def test_mcap_can_be_sought_in(root, tmp_path, compared_log):
     assert [json.loads(message.data)["tick"] for _, _, message in part] == list(range(199, 219))
 
 
+def test_the_foxglove_layout_shows_what_is_there(root, tmp_path, compared_log):
+    out = tmp_path / "run.mcap"
+    equipoise_run(root, "convert", compared_log, "--to", "mcap", "--out", out)
+    with out.open("rb") as stream:
+        messages = mcap.reader.make_reader(stream).iter_messages()
+        there = {channel.topic: set(json.loads(message.data)) for _, channel, message in messages}
+    layout = json.loads((root / "config/foxglove-layout.json").read_text())
+
+    def panels(part):
+        return {part} if isinstance(part, str) else panels(part["first"]) | panels(part["second"])
+
+    assert panels(layout["layout"]) == set(layout["configById"])
+    shown = [path["value"] for panel in layout["configById"].values() for path in panel.get("paths", [])]
+    assert len(shown) > 10
+    for path in shown:
+        topic, field = path.split(".", 1)
+        assert field in there[topic], path
+    (raw,) = (panel["topicPath"] for panel in layout["configById"].values() if "topicPath" in panel)
+    assert raw in there
+
+
 def test_convert_says_what_it_cannot_do(root, tmp_path):
     for arguments, complaint in [
         ([tmp_path / "none.lcm", "--to", "csv"], "none.lcm: cannot be read"),

@@ -128,6 +128,17 @@ def test_panels_follow_the_robot(known_log, tmp_path):
     assert not any("Ball" in title or "about y" in title for title in mip)
 
 
+@pytest.mark.parametrize(("robot", "motors"), [("mbbr", 3), ("mip", 2)])
+def test_every_motor_is_drawn_also_one_that_rests_and_no_other(tmp_path, robot, motors):
+    log = read_log(synthetic.write_log(tmp_path / "run.lcm", robot=robot))
+    log[names.MOTORS]["duty"][:, motors - 1] = 0.0
+    figure = figures.draw_report(log, summarise(log))
+    (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left") == "Duty")
+    drawn = [line.get_label() for line in axes.lines if line.get_label().startswith("motor")]
+    figures.plt.close(figure)
+    assert drawn == [f"motor {i + 1}" for i in range(motors)]
+
+
 def test_a_cut_off_log_is_reported_with_a_note(known_log, tmp_path, capsys):
     cut = tmp_path / "cut.lcm"
     cut.write_bytes(known_log.read_bytes()[:-777])

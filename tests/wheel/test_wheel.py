@@ -90,12 +90,14 @@ def test_sweep_in_processes():
 
 
 @pytest.mark.parametrize("name", ["Mbbr", "Mip"])
-def test_gymnasium_knows_the_environments_by_itself(name):
+@pytest.mark.parametrize("imports, module", [("import equipoise_robot", ""), ("", "equipoise_robot:")])
+def test_importing_the_package_registers_its_environments(name, imports, module):
     program = f"""
+{imports}
 import gymnasium
-env = gymnasium.make("Equipoise-{name}-v0")
+env = gymnasium.make("{module}Equipoise-{name}-v0")
 env.reset(seed=1)
-print(*env.step(env.action_space.sample())[1:4])
+print(*env.step(env.action_space.sample())[2:4])
 """
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert ran.stdout.endswith("False False\n"), ran.stderr

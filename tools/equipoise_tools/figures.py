@@ -191,8 +191,7 @@ class Report:
 
     def duties(self, axes: plt.Axes) -> None:
         motors = self.log[names.MOTORS]
-        moving = np.flatnonzero(np.abs(motors["duty"]).max(axis=0))
-        count = 1 + int(moving[-1]) if moving.size else 1
+        count = max(1, int(motors["motors"][0]))
         for motor in range(count):
             y = motors["duty"][:, motor]
             axes.plot(

@@ -13,6 +13,7 @@
 #include "equipoise/runtime/command_follower.hpp"
 #include "equipoise/runtime/command_wire.hpp"
 #include "equipoise/runtime/latest_value.hpp"
+#include "equipoise/runtime/remote.hpp"
 
 namespace equipoise::runtime {
 
@@ -23,18 +24,14 @@ struct CommandReceiverOptions {
   std::function<void(const std::string& what)> journal;
 };
 
-class CommandReceiver {
+class CommandReceiver final : public Remote {
  public:
   CommandReceiver(const CommandKeys& keys, const CommandReceiverOptions& options,
                   std::unique_ptr<CommandWire> wire);
-  ~CommandReceiver();
-  CommandReceiver(const CommandReceiver&) = delete;
-  CommandReceiver& operator=(const CommandReceiver&) = delete;
+  ~CommandReceiver() override;
 
-  /// Once per tick.
-  Command latest() noexcept;
-  /// What safety made of it.
-  void tell(ArmState state) noexcept;
+  Command latest() noexcept override;
+  void tell(ArmState state) noexcept override;
 
  private:
   double now_ms() const noexcept;

@@ -9,6 +9,7 @@ void add_commands(Subcommand app) {
   add_convert(app);
   add_keygen(app);
   add_send(app);
+  add_remote(app);
   add_model(app);
   add_bridge(app);
   add_geometry(app);

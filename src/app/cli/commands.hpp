@@ -13,6 +13,7 @@ void add_run(Subcommand app);
 void add_convert(Subcommand app);
 void add_keygen(Subcommand app);
 void add_send(Subcommand app);
+void add_remote(Subcommand app);
 void add_replay(Subcommand app);
 void add_model(Subcommand app);
 void add_bridge(Subcommand app);

@@ -182,10 +182,16 @@ void add_run(Subcommand app) {
   command.option("--path", a->path, kPathHelp);
   const Option arm = command.flag("--arm,!--no-arm", a->arm,
                                   "request the motors 0.5 s after the start (default: not on a board)");
+  const Option key = command
+                         .option("--command-key", a->command_key,
+                                 "take commands of holders of this key (keygen, send) instead of the script")
+                         .file();
   command
-      .option("--command-key", a->command_key,
-              "take commands of holders of this key (keygen, send) instead of the script")
-      .file();
+      .option("--remote", a->remote,
+              "take commands of a gamepad, a keyboard or an app through an HC-06 instead of the script: a "
+              "file, see remote learn and config/remotes")
+      .file()
+      .excludes(key);
   command.option("--robot-name", a->robot_name, "its name for senders (default: as in the key)");
   command
       .option("--command-url", a->command_url,

@@ -32,6 +32,7 @@ struct RunArguments {
   std::int64_t log_min_free_mb = 20;  // for others on the disk
   bool arm = false;
   std::string command_key;
+  std::string remote;
   std::string robot_name;
   std::string command_url = runtime::kDefaultTelemetryUrl;
   SessionOptions session;

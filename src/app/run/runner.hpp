@@ -8,6 +8,7 @@
 
 #include "app/cli/key_file.hpp"
 #include "app/io/hardware.hpp"
+#include "app/remote/hand_remote.hpp"
 #include "app/run/panel.hpp"
 #include "app/run/run_arguments.hpp"
 #include "app/run/script.hpp"
@@ -43,10 +44,15 @@ class Runner {
         script_(script_for<Firmware>(loaded_.config, a.drive_mps, 2.0 * kPi * a.yaw_hz, a.path)) {
     script_.arm = a.arm;
     if (!a.command_key.empty()) {
-      receiver_ = std::make_unique<runtime::CommandReceiver>(
+      remote_ = std::make_unique<runtime::CommandReceiver>(
           load_robot_key(a.command_key),
           runtime::CommandReceiverOptions{a.robot_name, config_.safety.command_timeout_s, say_on_stderr},
           open_wire(a.command_url, runtime::WireSide::kRobot));
+    } else if (!a.remote.empty()) {
+      const RemoteFile file = load_remote(a.remote);
+      remote_ = std::make_unique<HandRemote>(
+          open_hand(file),
+          HandRemote::Options{file.speed_m_s, file.turn_hz, config_.safety.command_timeout_s, say_on_stderr});
     }
   }
 
@@ -60,8 +66,7 @@ class Runner {
     ServiceNotify service;
     const auto commands = [&](std::int64_t tick, std::int64_t) {
       service.note(tick);
-      const Command asked =
-          receiver_ ? receiver_->latest() : script_.at(static_cast<double>(tick + 1) * kTickS);
+      const Command asked = remote_ ? remote_->latest() : script_.at(static_cast<double>(tick + 1) * kTickS);
       return panel_ != nullptr ? panel_->limit(asked) : asked;
     };
     Hardware hardware(io);
@@ -71,7 +76,7 @@ class Runner {
       const auto on_tick = [&](std::int64_t tick, std::int64_t now_ns, const RawSample& raw,
                                const Command& command, const auto& t) {
         observe(tick, now_ns, raw, command, t);
-        if (receiver_) receiver_->tell(t.arm_state);
+        if (remote_) remote_->tell(t.arm_state);
       };
       return observe.trial(
           runtime::run_loop(hardware, pipeline, commands, on_tick, observe.done(), supervisor));
@@ -122,8 +127,8 @@ class Runner {
   typename Firmware::Config config_;
   std::string board_toml_;
   Script script_;
-  std::unique_ptr<runtime::CommandReceiver> receiver_;  // null: the script
-  Panel* panel_ = nullptr;                              // null: no buttons
+  std::unique_ptr<runtime::Remote> remote_;  // null: the script
+  Panel* panel_ = nullptr;                   // null: no buttons
 };
 
 }  // namespace equipoise::app

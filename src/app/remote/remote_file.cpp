@@ -1,0 +1,140 @@
+#include "app/remote/remote_file.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+#include "app/remote/event_names.hpp"
+#include "config/toml_reader.hpp"
+
+namespace equipoise::app {
+namespace {
+
+using config::Document;
+using config::Section;
+
+constexpr std::size_t kLongestFrame = 32;
+
+bool is_motion(HandAction action) {
+  return action >= HandAction::kForward && action <= HandAction::kTurnRight;
+}
+
+std::vector<EventBinding> event_bindings(Section& s, HandAction action, const std::string& key) {
+  std::vector<EventBinding> bindings;
+  std::istringstream names(s.text(key));
+  for (std::string name; names >> name;) {
+    const auto event = event_named(name);
+    if (!event)
+      s.fail(key, "\"" + name + "\" is not known; allowed: names as KEY_W, BTN_START, ABS_Y, -ABS_Y");
+    if (event->axis && !is_motion(action)) s.fail(key, name + ": an axis moves and turns, nothing else");
+    bindings.push_back({action, event->axis, event->code, event->sign});
+  }
+  return bindings;
+}
+
+std::string from_hex(const std::string& text, Section& s, const std::string& key) {
+  const auto digit = [](char c) { return std::string("0123456789abcdef").find(c); };
+  std::string bytes;
+  for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
+    const std::size_t high = digit(text[i]);
+    const std::size_t low = digit(text[i + 1]);
+    if (high == std::string::npos || low == std::string::npos) break;
+    bytes.push_back(static_cast<char>(16 * high + low));
+  }
+  if (bytes.empty() || 2 * bytes.size() != text.size() || bytes.size() > kLongestFrame)
+    s.fail(key, "\"" + text + "\": allowed: 1 to " + std::to_string(kLongestFrame) +
+                    " bytes in hexadecimal, e.g. \"7e46\"");
+  return bytes;
+}
+
+void read_events(Section s, RemoteFile* out) {
+  if (s.has("axis_range")) {
+    const auto range = s.numbers("axis_range", 2, -1e9, 1e9);
+    if (!(range[0] < range[1])) s.fail("axis_range", "allowed: the lower number first");
+    out->axis_range = {static_cast<int>(range[0]), static_cast<int>(range[1])};
+  }
+  for (std::size_t i = 0; i < kHandActions.size(); ++i) {
+    if (!s.has(kHandActions[i])) continue;
+    const auto bindings = event_bindings(s, static_cast<HandAction>(i), kHandActions[i]);
+    out->events.insert(out->events.end(), bindings.begin(), bindings.end());
+  }
+  s.finish();
+}
+
+void read_frames(Section s, RemoteFile* out) {
+  for (std::size_t i = 0; i < kHandActions.size(); ++i) {
+    if (!s.has(kHandActions[i])) continue;
+    std::istringstream texts(s.text(kHandActions[i]));
+    for (std::string text; texts >> text;)
+      out->frames.push_back({static_cast<HandAction>(i), from_hex(text, s, kHandActions[i])});
+    const std::string why = confusion(out->frames);
+    if (!why.empty()) s.fail(kHandActions[i], why);
+  }
+  s.finish();
+}
+
+template <class Bindings>
+bool binds(const Bindings& bindings, HandAction action) {
+  return std::any_of(bindings.begin(), bindings.end(), [&](const auto& b) { return b.action == action; });
+}
+
+RemoteFile read_remote(const Document& document) {
+  Section root(document, document.root(), "");
+  RemoteFile out;
+  Section about = root.table("remote");
+  out.kind =
+      about.choice("kind", {"events", "frames"}) == 0 ? RemoteFile::Kind::kEvents : RemoteFile::Kind::kFrames;
+  out.device = about.text("device");
+  out.speed_m_s = about.number("speed_m_s", 0.0, 2.0);  // the command line's ranges
+  out.turn_hz = about.number("turn_hz", 0.0, 5.0);
+  const bool frames = out.kind == RemoteFile::Kind::kFrames;
+  out.hold_s = about.number("hold_s", 0.05, 10.0);
+  if (frames) out.baud = about.integer("baud", 1200, 115200);
+  about.finish();
+  if (frames) {
+    read_frames(root.table("frames"), &out);
+  } else {
+    read_events(root.table("events"), &out);
+  }
+  const bool arms = frames ? binds(out.frames, HandAction::kArm) : binds(out.events, HandAction::kArm);
+  const bool disarms =
+      frames ? binds(out.frames, HandAction::kDisarm) : binds(out.events, HandAction::kDisarm);
+  if (!arms || !disarms)
+    root.fail(frames ? "frames" : "events", "needs arm and disarm: who starts motors can stop them");
+  root.finish();
+  return out;
+}
+
+}  // namespace
+
+RemoteFile load_remote(const std::string& path) { return read_remote(Document(path, {})); }
+
+RemoteFile parse_remote(const std::string& text, const std::string& origin) {
+  return read_remote(Document::parse(text, origin));
+}
+
+std::string to_hex(const std::string& bytes) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const char c : bytes) {
+    text += kDigits[static_cast<unsigned char>(c) >> 4];
+    text += kDigits[static_cast<unsigned char>(c) & 15];
+  }
+  return text;
+}
+
+/// A frame that another one begins with would always be heard in its place.
+std::string confusion(const std::vector<FrameBinding>& frames) {
+  for (const FrameBinding& a : frames) {
+    for (const FrameBinding& b : frames) {
+      if (a.action == b.action || b.bytes.compare(0, a.bytes.size(), a.bytes) != 0) continue;
+      const std::string name = kHandActions[index_of(b.action)];
+      const std::string other = kHandActions[index_of(a.action)];
+      return a.bytes == b.bytes
+                 ? to_hex(b.bytes) + " is " + name + " and " + other
+                 : name + " (" + to_hex(b.bytes) + ") begins with " + other + " (" + to_hex(a.bytes) + ")";
+    }
+  }
+  return "";
+}
+
+}  // namespace equipoise::app
