@@ -47,11 +47,14 @@ class DeadEncoders {
           if (z.gyro_axis_ok[i]) pair.turned_rad[i] += kTickS * z.gyro_B_rad_s(static_cast<int>(i));
         }
         pair.wheels_yaw_rad += yaw_from_wheels_.dot(moved);
+        pair.others_rad += moved.template lpNorm<1>();
+        ++pair.ticks;
         const bool one_alone = lost == a || lost == b;  // what the lost one did is not known
         const bool tips = std::hypot(pair.turned_rad[0], pair.turned_rad[1]) > kTips_rad;
         const bool yaws = one_alone ? std::abs(pair.turned_rad[2]) > kYawsForOne_rad
-                                    : std::abs(pair.turned_rad[2] - pair.wheels_yaw_rad) > kYaws_rad;
-        if (tips || yaws) dead_ |= 1U << a | 1U << b;
+                                    : std::abs(pair.turned_rad[2] - pair.wheels_yaw_rad) > kYawUnseen_rad;
+        const bool others = !one_alone && pair.others_rad > kOthers_rad && pair.ticks > kPassing;
+        if (tips || yaws || others) dead_ |= 1U << a | 1U << b;
       }
     }
   }
@@ -62,12 +65,16 @@ class DeadEncoders {
   // Above what 40 sound robots of the population reached, standing, turning, driving, pushed and suddenly
   // commanded.
   static constexpr double kTips_rad = 0.12;
-  static constexpr double kYaws_rad = 0.2;
+  static constexpr double kYawUnseen_rad = 0.13;
   static constexpr double kYawsForOne_rad = 2.2;
+  static constexpr double kOthers_rad = 1.0;
+  static constexpr int kPassing = 40;  // ticks: drive and turn do not cancel for longer
 
   struct Pair {
     std::array<double, 3> turned_rad{};  // body, since both stand still
     double wheels_yaw_rad = 0.0;         // what the other wheels say of its yaw
+    double others_rad = 0.0;             // their way
+    int ticks = 0;
   };
 
   Vec<Wheels> yaw_from_wheels_;

@@ -80,6 +80,7 @@ class MbbrEstimators {
   GyroWatch<Mbbr::kWheels> gyro_watch_;
   DeadEncoders<Mbbr::kWheels> dead_encoders_;
   SlowDrift<2> bias_drift_;
+  double turned_lately_rad_s_ = 0.0;  // about z
   KalmanFilter<MbbrPublishedModel> ekf13_published_;
   KalmanFilter<MbbrModel13> ekf13_;
   KalmanFilter<MbbrLinearModel> kf_;

@@ -138,7 +138,7 @@ void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   isolation_.step(ekf_, u, believed, [&](const Vec2& wheel_rates) {
     return kinematics_.psi(wheel_rates) - believed.gyro_B_rad_s.z();
   });
-  bias_drift_.update(ekf_.x().segment<1>(MipEkfModel::kGyroBias), 0.0);
+  bias_drift_.update(ekf_.x().segment<1>(MipEkfModel::kGyroBias), 0.0, 0.0);
   dead_encoders_.update(believed, isolation_.lost());
   GyroWitness<Mip::kWheels> witness;
   witness.blamed_wheel = isolation_.lost();
