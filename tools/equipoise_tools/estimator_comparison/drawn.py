@@ -1,5 +1,5 @@
-"""Samples drawn from the filters' own model: process and sensors with the noise that they believe in, so that NIS
-must be 1. The robot is held upright by an LQR that knows its state."""
+"""Samples drawn from the filters' own model: process and sensors with the noise that they believe in, so that
+NIS must be 1. The robot is held upright by an LQR that knows its state."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Three filters of one model and one noise, each over many flights at once: extended, unscented, error-state.
 
-A step is predict(u) and update(u, y, use); x holds the model's states, heading_rad what the yaw rate adds up to.
-nu: innovations, whitened in the order of the rows, so that their squares are the firmware's row_nis().
+A step is predict(u) and update(u, y, use); x holds the model's states, heading_rad what the yaw rate adds
+up to. nu: innovations, whitened in the order of the rows, so that their squares are the firmware's row_nis().
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from .model import AT, DT, N, PHI, ROWS, SCALE, Model
+from .model import AT, DT, MOTION, PHI, ROWS, SCALE, Model, N, U
 
 TURN = AT["dtz"]
 RATES = slice(5, 8)
@@ -151,8 +151,8 @@ def exponential(turn: np.ndarray) -> np.ndarray:
 
 
 class WithHeading(Extended):
-    """Heading as one more state, that follows the innovations through its covariance: a control for what comes
-    next, which cannot do without."""
+    """Heading as one more state, which follows the innovations through its covariance: a control for the next
+    filter, which has to have it."""
 
     name: ClassVar[str] = "extended, heading a state"
     errors: ClassVar[int] = N + 1  # heading last
@@ -186,9 +186,9 @@ class WithHeading(Extended):
 
 
 class ErrorState(WithHeading):
-    """The attitude's error is a rotation, right-invariant: R = Exp(xi) R_hat, xi resolved in the yaw frame; the
-    rates' error is one of body rates. The other errors are differences, as before; the noise is the same, brought
-    into these coordinates."""
+    """The attitude's error is a rotation, right-invariant: R = Exp(xi) R_hat, xi resolved in the yaw frame;
+    the rates' error is one of body rates. The other errors are differences, as before; the noise is the same,
+    brought into these coordinates."""
 
     name: ClassVar[str] = "error-state"
     PLACES: ClassVar[list[int]] = [0, 1, N, 5, 6, 7]  # angles, rates
@@ -234,4 +234,18 @@ class ErrorState(WithHeading):
         self.heading_rad = self.heading_rad + np.arctan2(R[:, 1, 0], R[:, 0, 0])
 
 
-FILTERS = (Extended, Unscented, ErrorState, WithHeading)
+class WithTorques(Extended):
+    """F's columns of the disturbance where the robot is, in place of upright at rest, and what the yaw rate
+    does to the disturbance's direction: a control for the sigma points, which see both."""
+
+    name: ClassVar[str] = "extended, whole F"
+
+    def _propagate(self, u: np.ndarray) -> None:
+        B = self.model.input_jacobian(self.x, u)
+        self.x, F = self.model.predict(self.x, u)
+        F[:, :MOTION, U] = B
+        F[:, U.start, TURN], F[:, U.start + 1, TURN] = DT * self.x[16], -DT * self.x[15]
+        self.P = F @ self.P @ F.transpose(0, 2, 1) + self.model.Q
+
+
+FILTERS = (Extended, Unscented, ErrorState, WithTorques, WithHeading)

@@ -1,10 +1,11 @@
-"""Recorded flights as the filters get them: samples on one time base, from the last tick that the robot was held."""
+"""Recorded flights as the filters get them: on one time base, from the last tick that the robot was held."""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from time import process_time
 
 import equipoise_robot as eq
 import numpy as np
@@ -23,6 +24,7 @@ class Flight:
     robot_number: int
     yaw_hz: float
     drive_mps: float
+    fidelity: str
     ended: str
     config: dict
     t_s: np.ndarray
@@ -46,7 +48,8 @@ def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, s
     sound: list[bool] = []
 
     def listen(tick: eq.EstimatorTick) -> eq.State:
-        heard.append((tick.t_s, tick.held, *tick.gyro_B_rad_s, *tick.accel_B_m_s2, *tick.wheel_angle_rad, *tick.u))
+        imu = (*tick.gyro_B_rad_s, *tick.accel_B_m_s2)
+        heard.append((tick.t_s, tick.held, *imu, *tick.wheel_angle_rad, *tick.u))
         sound.append(tick.imu_ok and tick.encoders_ok)
         return tick.own
 
@@ -62,7 +65,7 @@ def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, s
         **more,
     )
     if not all(sound) or run.degraded:
-        raise eq.UserError(f"robot {robot_number}: samples are missing; every row has to be there for a comparison")
+        raise eq.UserError(f"robot {robot_number}: samples are missing; a comparison needs all")
     table = np.array(heard, float)
     states = {name: run.log[f"EQUIPOISE_{name}"] for name in ("STATE", "TRUTH")}
     five = {name: _five(s["theta_rad"], s["phi_dot_rad_s"]) for name, s in states.items()}
@@ -70,6 +73,7 @@ def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, s
         robot_number,
         yaw_hz,
         drive_mps,
+        run.fidelity,
         run.ended,
         tomllib.loads(run.log.run.config_toml),
         table[:, 0],
@@ -107,7 +111,7 @@ def moving(gyro: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Samples:
-    """Of many flights, ticks first: what acted and stood at the filter's instant, and what there is to judge by."""
+    """Of many flights, ticks first: what acted and stood at the filter's instant, and what to judge by."""
 
     robot: Robot
     x0: np.ndarray  # (states, flights)
@@ -125,7 +129,7 @@ class Samples:
 def samples_of(flights: Iterable[Flight], **changed: float) -> Samples:
     """`changed`: parameters that the filters are told wrongly."""
     flights = list(flights)
-    robot = robot_of(flights[0].config, **changed)
+    robot = robot_of(flights[0].config, flights[0].fidelity, **changed)
     part = robot.age_s / DT
     if not 0.0 <= part < 1.0:
         raise eq.UserError(f"chain.gyro_delay_s: {robot.age_s} s; this comparison knows ages below a tick")
@@ -154,7 +158,8 @@ def samples_of(flights: Iterable[Flight], **changed: float) -> Samples:
         columns.append((x0, acted, u[1:], y, use, *judged))
     if len({len(c[1]) for c in columns}) > 1:
         raise eq.UserError("flights of different lengths: one of them ended early")
-    x0, acted, latest, y, use, t_s, truth, own, own_nis = (np.stack(c, axis=-1) for c in zip(*columns, strict=True))
+    stacked = (np.stack(c, axis=-1) for c in zip(*columns, strict=True))
+    x0, acted, latest, y, use, t_s, truth, own, own_nis = stacked
     return Samples(robot, x0, acted, latest, y, use, t_s[:, 0], truth, own, own_nis, part * DT)
 
 
@@ -162,26 +167,22 @@ def samples_of(flights: Iterable[Flight], **changed: float) -> Samples:
 class Estimates:
     five: np.ndarray  # (ticks, 5, flights), as Flight.own
     nu: np.ndarray  # (ticks, rows, flights): whitened innovations
-    seconds: float = 0.0
+    seconds: float = 0.0  # of the processor
 
 
 def run_filter(kind, samples: Samples, ticks: int | None = None, tilt_offset=(0.0, 0.0)) -> Estimates:
     """Over the recorded samples; tilt_offset: how wrong the start is."""
-    from time import perf_counter
-
     x0 = samples.x0.copy()
     x0[:2] += np.asarray(tilt_offset)[:, None]
     filter_ = kind(Model(samples.robot), x0)
     count = len(samples.y) if ticks is None else ticks
     five = np.empty((count, 5, x0.shape[1]))
     nu = np.empty((count, ROWS, x0.shape[1]))
-    began = perf_counter()
+    began = process_time()
     for k in range(count):
         filter_.predict(samples.acted[k])
         filter_.update(samples.acted[k], samples.y[k], samples.use[k])
         tilt, ball, heading = filter_.now(samples.latest[k], samples.ahead_s)
         five[k, :2], five[k, 2:4], five[k, 4] = tilt, ball, heading
         nu[k] = filter_.nu
-    return Estimates(five, nu, perf_counter() - began)
-
-
+    return Estimates(five, nu, process_time() - began)

@@ -1,4 +1,4 @@
-"""What a filter's estimates are worth: errors against the plant's truth, innovations against their covariance."""
+"""What a filter's estimates are worth: errors against the truth, innovations against their covariance."""
 
 from __future__ import annotations
 

@@ -1,17 +1,18 @@
 """The MBBR's filter model as NumPy functions, from the derivation's SymPy expressions.
 
-The readable form is MbbrEkfModel (src/robots/mbbr/ekf.cpp). States come first: x[i] is an array over flights, or
-over sigma points and flights.
+The readable form is MbbrEkfModel (src/robots/mbbr/ekf.cpp). States come first: x[i] is an array over
+flights, or over sigma points and flights.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import sympy as sp
-from derive import mbbr, mbbr_filter, mbbr_header
+from derive import mbbr_filter, mbbr_header
 from derive.filter_header import DT
 
 STATES = mbbr_filter.STATES
@@ -55,8 +56,9 @@ def wheel_axes(latitude_deg: float, azimuth_deg: float) -> np.ndarray:
     return np.stack([c * first[0] - s * first[1], s * first[0] + c * first[1], np.full(3, first[2])])
 
 
-def robot_of(config: dict, **changed: float) -> Robot:
-    """Of a run's configuration; `changed`: parameters that the filter is told wrongly."""
+def robot_of(config: dict, fidelity: str = "full", **changed: float) -> Robot:
+    """Of a run's configuration and world; `changed`: parameters that the filter is told wrongly."""
+    filtered = config["world"][fidelity]["disturbance"]["imu_low_pass"] > 0
     r, e = config["robot"], config["estimator"]["ekf"]
     I_t1, I_t2, I_t3 = r["body_inertia_kg_m2"]
     named = {
@@ -81,7 +83,7 @@ def robot_of(config: dict, **changed: float) -> Robot:
         T_ob=wheel_axes(r["wheel_latitude_deg"], r["wheel_azimuth_deg"]),
         lever_arm=np.array(r["imu_position_m"][:2]),
         time_constant_s=e["disturbance_time_constant_s"],
-        age_s=config["chain"]["gyro_delay_s"],
+        age_s=config["chain"]["gyro_delay_s"] if filtered else 0.0,
         q=np.array(e["q"]),
         r=np.array(e["r"]),
         input_variance=np.array(e["input_variance"]),
@@ -99,33 +101,55 @@ def _entries(arguments, expressions: dict):
     return lambda *values: zip(kept, f(*values), strict=True)
 
 
-@lru_cache(maxsize=4)
-def functions(parameters: tuple[tuple[str, float], ...]):
-    """(derivative, its Jacobian, accelerometer, its Jacobian, its coefficients of the torques)."""
+@dataclass(frozen=True)
+class Functions:
+    """Of (coefficients, motion, torques), but for the first, which is of the parameters by name."""
+
+    coefficients: Callable
+    names: tuple[str, ...]
+    rate: Callable
+    rate_jacobian: Callable
+    rate_by_torque: Callable
+    accel: Callable
+    accel_jacobian: Callable
+
+
+@lru_cache(maxsize=1)
+def functions() -> Functions:
+    """The derivation's expressions, with the coefficients' names as the firmware has them."""
     model = mbbr_header.model()
-    numbers = model.numbers(dict(parameters))
+    parameters = {name: sp.Symbol(name, positive=True) for name in model.parameters}
+    named: dict[str, sp.Expr] = {}
 
     def rows(index: int):
-        return [
-            sum(numbers[f"{name}_{label}"] * monomial for label, monomial, _ in model.terms(e))
-            for name, e in zip(model.rows[index].names, model.rows[index].expressions, strict=True)
-        ]
+        out = []
+        for name, e in zip(model.rows[index].names, model.rows[index].expressions, strict=True):
+            terms = model.terms(e)
+            named.update({f"{name}_{label}": value for label, _, value in terms})
+            out.append(sum(sp.Symbol(f"{name}_{label}") * monomial for label, monomial, _ in terms))
+        return out
 
     tx, ty, dtx, dty, dtz, px, py = model.state
     a, accel = rows(0), rows(1)
+    lumped = {sp.Symbol(k, positive=True): e for k, e in model.lumped.items()}
+    determinants = {sp.Symbol(k): e for k, e in model.denominators.items()}
+    values = [e.subs(determinants).subs(lumped) for e in named.values()]
     motion = (tx, ty, *sp.symbols("ex ey ez"), dtx, dty, dtz, px, py)
     # phi*' lives in a frame that turns; the sums: [T] (5.31).
     sums = [px + ty * dtz, py - tx * dtz, ty * px - tx * py - dtz]
     rate = [dtx, dty, *sums, *a[:3], a[3] + dtz * py, a[4] - dtz * px]
-    arguments = (motion, model.inputs)
+    arguments = (tuple(sp.Symbol(name) for name in named), motion, model.inputs)
     J = {(i, j): sp.diff(f, v) for i, f in enumerate(rate) for j, v in enumerate(motion)}
+    G = {(i, j): sp.diff(f, v) for i, f in enumerate(rate) for j, v in enumerate(model.inputs)}
     H = {(i, MOVED[j]): sp.diff(f, v) for i, f in enumerate(accel) for j, v in enumerate(model.state)}
-    return (
+    return Functions(
+        sp.lambdify([tuple(parameters.values())], values, "math"),
+        tuple(named),
         sp.lambdify(arguments, rate, "numpy", cse=True),
         _entries(arguments, J),
+        _entries(arguments, G),
         sp.lambdify(arguments, accel, "numpy", cse=True),
         _entries(arguments, H),
-        (numbers["accel_x_uy"], numbers["accel_y_ux"]),
     )
 
 
@@ -134,8 +158,11 @@ class Model:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        functions_ = functions(robot.parameters)
-        self._rate, self._rate_jacobian, self._accel, self._accel_jacobian, self._accel_u = functions_
+        self._f = functions()
+        known = dict(robot.parameters)
+        self._c = tuple(self._f.coefficients([known[name] for name in mbbr_header.model().parameters]))
+        numbers = dict(zip(self._f.names, self._c, strict=True))
+        self._accel_u = numbers["accel_x_uy"], numbers["accel_y_ux"]
         self.keep = np.exp(-DT / robot.time_constant_s)
         self.W = robot.value("r") / robot.value("r_w") * robot.T_ob.T
         zero = np.zeros((MOTION, 3))
@@ -147,13 +174,13 @@ class Model:
 
     def rate(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         out = np.empty((MOTION, *x.shape[1:]))
-        for i, value in enumerate(self._rate(x, u)):
+        for i, value in enumerate(self._f.rate(self._c, x, u)):
             out[i] = value
         return out
 
     def _rate_and_jacobian(self, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         A = np.zeros((x.shape[1], MOTION, MOTION))
-        for (i, j), value in self._rate_jacobian(x, u):
+        for (i, j), value in self._f.rate_jacobian(self._c, x, u):
             A[:, i, j] = value
         return self.rate(x, u), A
 
@@ -173,8 +200,26 @@ class Model:
         F = 0.75 * DT * A @ slope + one + 0.25 * DT * A_first
         return x + DT / 4.0 * (first + 3.0 * third), F
 
+    def input_jacobian(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """d(motion after a tick)/d(torques felt) where the robot is; the firmware's B: upright at rest."""
+        felt = u + x[U]
+
+        def at(motion: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            G = np.zeros((x.shape[1], MOTION, 3))
+            for (i, j), value in self._f.rate_by_torque(self._c, motion, felt):
+                G[:, i, j] = value
+            return *self._rate_and_jacobian(motion, felt), G
+
+        first, _, G_first = at(x[:MOTION])
+        second, A, G = at(x[:MOTION] + DT / 3.0 * first)
+        slope = G + DT / 3.0 * A @ G_first
+        _, A, G = at(x[:MOTION] + 2.0 * DT / 3.0 * second)
+        B = DT / 4.0 * (G_first + 3.0 * (G + 2.0 * DT / 3.0 * A @ slope))
+        B[:, E] *= (1.0 + x[SCALE])[:, None, None]
+        return B
+
     def step(self, x: np.ndarray, u: np.ndarray, plane_scale: np.ndarray) -> np.ndarray:
-        """x after a tick. plane_scale: that of the sums about x and y, which the filters do not learn from."""
+        """x after a tick. plane_scale: of the sums about x and y, which the filters do not learn from."""
         out = x.copy()
         out[:MOTION] = self.ahead(x[:MOTION], u + x[U], DT)
         return self._finish(x, out, plane_scale)
@@ -218,7 +263,7 @@ class Model:
         y[2] = rate_z * (1.0 - 0.5 * (mx * mx + my * my)) - mx * rate_y + my * rate_x
         ball = np.stack([ex - (1.0 + plane_scale) * tx, ey - (1.0 + plane_scale) * ty, ez])
         y[3:6] = np.tensordot(self.W, ball, 1)
-        accel = self._accel(x[:MOTION], u + x[U])
+        accel = self._f.accel(self._c, x[:MOTION], u + x[U])
         for i, mount in enumerate((my, -mx)):
             y[6 + i] = accel[i] + GRAVITY * mount + dtz * dtz * self.robot.lever_arm[i]
         return y
@@ -246,7 +291,7 @@ class Model:
                 H[:, i, AT[name]] = value
         H[:, 3:6, E] = self.W
         H[:, 3:6, :2] = -(1.0 + x[SCALE])[:, None, None] * self.W[:, :2]
-        for (i, j), value in self._accel_jacobian(x[:MOTION], u + x[U]):
+        for (i, j), value in self._f.accel_jacobian(self._c, x[:MOTION], u + x[U]):
             H[:, 6 + i, j] = value
         H[:, 6:8, AT["dtz"]] += 2.0 * dtz[:, None] * self.robot.lever_arm
         H[:, 6, AT["uy"]], H[:, 7, AT["ux"]] = self._accel_u
