@@ -248,4 +248,4 @@ class WithTorques(Extended):
         self.P = F @ self.P @ F.transpose(0, 2, 1) + self.model.Q
 
 
-FILTERS = (Extended, Unscented, ErrorState, WithTorques, WithHeading)
+FILTERS = (Extended, Unscented, ErrorState, WithHeading)

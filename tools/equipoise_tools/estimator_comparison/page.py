@@ -137,7 +137,7 @@ def insert(path: Path, text: str) -> None:
 
 def _range(axes: plt.Axes, at: float, values: np.ndarray, index: int, label: str | None) -> None:
     middle, low, high = spread(values)
-    markers = "os^Dv"
+    markers = "os^D"
     axes.plot([at, at], [low, high], color=style.colour(index), lw=1.6)
     axes.plot(at, middle, markers[index], color=style.colour(index), ms=4.5, label=label)
 
@@ -153,7 +153,7 @@ def draw(rows: list[Row], out_dir: Path) -> None:
             for at, case in enumerate(shown):
                 for i, filter_ in enumerate(NAMES):
                     values = scale * _value(name, column(rows, name, filter_, **case))
-                    _range(axes, at + 0.15 * (i - 2.0), values, i, filter_ if at == 0 else None)
+                    _range(axes, at + 0.17 * (i - 1.5), values, i, filter_ if at == 0 else None)
             axes.set(title=title, ylabel=unit, xticks=range(len(shown)))
             axes.set_xticklabels([f"{c['yaw_hz']:g} Hz\n{100 * c['drive_mps']:.0f} cm/s" for c in shown])
             if name == "heading_error_rad":
@@ -170,7 +170,7 @@ def draw(rows: list[Row], out_dir: Path) -> None:
                 ticks.append((at, f"{of}\n{group}" if j == 1 else of))
                 for i, filter_ in enumerate(NAMES):
                     values = column(rows, f"nis_{group}", filter_, **case)
-                    _range(axes, at + 0.15 * (i - 2.0), values, i, None)
+                    _range(axes, at + 0.17 * (i - 1.5), values, i, None)
         axes.axhline(1.0, color=style.TRUTH, lw=0.9)
         axes.set(title="NIS per degree of freedom", yscale="log", xticks=[at for at, _ in ticks])
         axes.set_xticklabels([text for _, text in ticks])
