@@ -1,0 +1,1 @@
+"""The default filter of the MBBR beside an unscented and an error-state one, on the same recorded samples."""
