@@ -129,6 +129,14 @@ TEST(RandomCommands, AHeldRobotThatTipsHasNoDeadEncoder) {
   EXPECT_EQ(loss<app::MbbrFirmware>(config, {"scheduled", kMbbrRange}, 994), "");
 }
 
+/// It turns and drives so that two wheels stand still: their encoders are not dead.
+TEST(RandomCommands, WheelsThatATurnLeavesStillAreNotDead) {
+  const app::Choice choice{app::MbbrFirmware::kDefaultEstimator, "scheduled", "full"};
+  const auto config =
+      app::MbbrFirmware::apply(app::MbbrFirmware::load(config_file<app::MbbrFirmware>(), {}).config, choice);
+  EXPECT_EQ(loss<app::MbbrFirmware>(config, {"scheduled", kMbbrRange}, 1227), "");
+}
+
 TEST(RandomCommands, NoneMakesTheMipFallUnderSlc) {
   EXPECT_EQ(lost<app::MipFirmware>({"slc", kMipRange}), 0);
 }

@@ -1,8 +1,7 @@
-// How far a value has gone lately that may only creep. In: value, how far known causes may have moved it, for as
-// long as the mean remembers or for a moment -> out: its distance from its own mean over the last 20 s, less what
-// the causes explain. A gyro's bias follows
-// the temperature; one that is elsewhere within a second is a gyro that lies, or a filter that explains
-// something else by it. RT-safe.
+// How far a value has gone lately that may only creep. In: value, how far known causes may have moved it, for
+// as long as the mean remembers or for a moment -> out: its distance from its own mean over the last 20 s,
+// less what the causes explain. A gyro's bias follows the temperature; one that is elsewhere within a second
+// is a gyro that lies, or a filter that explains something else by it. RT-safe.
 #pragma once
 
 #include <algorithm>
