@@ -47,7 +47,7 @@ class GyroWatch {
  public:
   using Sample = Measurement<Wheels>;
 
-  explicit GyroWatch(const GyroWatchParams<Wheels>& params) : p_(params) {}
+  explicit GyroWatch(const GyroWatchParams<Wheels>& params) : p_(params) { reset(); }
 
   void reset() noexcept {
     samples_ = 0;
@@ -57,6 +57,7 @@ class GyroWatch {
     settling_ = 0;
     evidence_ = 0.0;
     for (Odds& odds : swapped_) odds = Odds::Zero();
+    weighs_ = false;
     contradicted_ = 0;
     mirrored_ = 0;
     listened_ = 0;
@@ -361,7 +362,7 @@ class GyroWatch {
   int settling_ = 0;  // ticks left
   double evidence_ = 0.0;
   // Per lie, against that wheel's encoder; is one of them more than zero?
-  std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_{};
+  std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_;  // by reset()
   bool weighs_ = false;
   int contradicted_ = 0;    // ticks in a row
   int mirrored_ = 0;        // ticks in a row
