@@ -274,6 +274,7 @@ void add_campaign(Subcommand app) {
   command.option("--robot", a->robot, "of the population, the first; 0: the typical one").show_default();
   command.option("--robots", a->robots, "of the population").show_default().range(1, 100000);
   std::vector<std::string> faults;
+  faults.reserve(kFaults.size());
   for (const FaultInfo& fault : kFaults) faults.emplace_back(fault.name);
   command.option("--fault", a->faults, "only these").one_of(faults);
   command.option("--phase", a->phases, "only these").one_of({kPhaseNames.begin(), kPhaseNames.end()});

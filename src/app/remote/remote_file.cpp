@@ -129,9 +129,11 @@ std::string confusion(const std::vector<FrameBinding>& frames) {
       if (a.action == b.action || b.bytes.compare(0, a.bytes.size(), a.bytes) != 0) continue;
       const std::string name = kHandActions[index_of(b.action)];
       const std::string other = kHandActions[index_of(a.action)];
-      return a.bytes == b.bytes
-                 ? to_hex(b.bytes) + " is " + name + " and " + other
-                 : name + " (" + to_hex(b.bytes) + ") begins with " + other + " (" + to_hex(a.bytes) + ")";
+      std::string text = name;
+      if (a.bytes == b.bytes)
+        return text.append(" and ").append(other).append(" are both ").append(to_hex(b.bytes));
+      text.append(" (").append(to_hex(b.bytes)).append(") begins with ").append(other);
+      return text.append(" (").append(to_hex(a.bytes)).append(")");
     }
   }
   return "";
