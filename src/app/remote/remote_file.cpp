@@ -129,10 +129,10 @@ std::string confusion(const std::vector<FrameBinding>& frames) {
       if (a.action == b.action || b.bytes.compare(0, a.bytes.size(), a.bytes) != 0) continue;
       const std::string name = kHandActions[index_of(b.action)];
       const std::string other = kHandActions[index_of(a.action)];
-      std::string text = name;
+      std::string text;
       if (a.bytes == b.bytes)
-        return text.append(" and ").append(other).append(" are both ").append(to_hex(b.bytes));
-      text.append(" (").append(to_hex(b.bytes)).append(") begins with ").append(other);
+        return text.append(to_hex(b.bytes)).append(" is ").append(name).append(" and ").append(other);
+      text.append(name).append(" (").append(to_hex(b.bytes)).append(") begins with ").append(other);
       return text.append(" (").append(to_hex(a.bytes)).append(")");
     }
   }
