@@ -58,6 +58,7 @@ class GyroWatch {
     evidence_ = 0.0;
     for (Odds& odds : swapped_) odds = Odds::Zero();
     weighs_ = false;
+    blamed_ = 0;
     contradicted_ = 0;
     mirrored_ = 0;
     listened_ = 0;
@@ -131,7 +132,9 @@ class GyroWatch {
     const bool blames_wheel = witness.blamed_wheel >= 0;
     if (evidence_ > (blames_wheel ? kProofOfAnError : kProof)) condemn(nearest_);
     if (samples_ == static_cast<int>(kKept) && calm && !witness.wheel_stands) weigh(witness);
-    if (blames_wheel && swapped_[static_cast<std::size_t>(witness.blamed_wheel)].maxCoeff() > kRather)
+    blamed_ = blames_wheel ? std::min(blamed_ + 1, kSoon) : 0;
+    if (blames_wheel && blamed_ < kSoon &&
+        swapped_[static_cast<std::size_t>(witness.blamed_wheel)].maxCoeff() > kRather)
       trusted_ = false;
   }
 
@@ -154,6 +157,7 @@ class GyroWatch {
   static constexpr double kMostOfAWeighing = 100.0;
   static constexpr double kDoubt = 4.0;      // a tick, for the encoder
   static constexpr double kRather = 30.0;    // swapped axes; lying encoders of robots 301 to 350: below 18
+  static constexpr int kSoon = 400;          // ticks; by then a robot with a swapped gyro lies
   static constexpr double kExplains = 0.25;  // of the surprise is left with another gyro
   static constexpr double kScale = 0.05;     // error of a rate by the wheels: radii, rollers
   static constexpr double kMount = 0.015;    // rad, of the IMU: what an axis sees of the others
@@ -163,7 +167,7 @@ class GyroWatch {
   static constexpr int kMaxImpossible = 3;   // samples in a row
   static constexpr int kGone = 6;  // an axis that was so wrong for so long is not believed when it slows down
   static constexpr int kMaxWithout = 4;            // ticks
-  static constexpr int kReported = 5;              // ticks
+  static constexpr int kReported = 4;              // ticks
   static constexpr double kNoiseMean = 0.05;       // of second differences, 20 ticks
   static constexpr double kMostNoise_rad_s = 1.0;  // one bad sample of ten stays below 0.42
   static constexpr double kNoisy_rad_s = 0.6;      // sound robots stay below 0.18
@@ -364,6 +368,7 @@ class GyroWatch {
   // Per lie, against that wheel's encoder; is one of them more than zero?
   std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_;  // by reset()
   bool weighs_ = false;
+  int blamed_ = 0;          // ticks since an encoder is left out
   int contradicted_ = 0;    // ticks in a row
   int mirrored_ = 0;        // ticks in a row
   Lie nearest_ = kLies[0];  // that explains most

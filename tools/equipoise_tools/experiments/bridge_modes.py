@@ -50,9 +50,7 @@ def cases() -> list[Case]:
 
 
 def measure(lab: Lab) -> Data:
-    data = Data()
-    lab.run(cases(), data)
-    return data
+    return lab.run(cases())
 
 
 def report(data: Data, out_dir: Path) -> Result:

@@ -60,7 +60,6 @@ def trace(log: Log) -> dict:
 
 
 def measure(lab: Lab) -> Data:
-    data = Data()
     cases = [
         Case(
             case_name(world, gain),
@@ -73,8 +72,7 @@ def measure(lab: Lab) -> Data:
         for world in WORLDS.values()
         for gain in GAINS
     ]
-    lab.run(cases, data)
-    return data
+    return lab.run(cases)
 
 
 def report(data: Data, out_dir: Path) -> Result:

@@ -172,8 +172,9 @@ class Lab:
     seeds: int = 20
     jobs: int = 1
 
-    def run(self, cases: list[Case], data: Data) -> None:
-        """Adds every run of every case; the order of the cores does not matter."""
+    def run(self, cases: list[Case]) -> Data:
+        """Every run of every case; the order of the cores does not matter."""
+        data = Data()
         jobs = []
         for case in cases:
             seeds = case.seeds or tuple(range(1, self.seeds + 1))
@@ -184,6 +185,7 @@ class Lab:
                 data.traces.update(part.traces)
                 if done % 50 == 0 or done == len(jobs):
                     print(f"    {done} of {len(jobs)} runs", file=sys.stderr, flush=True)
+        return data
 
 
 def over_estimate(log: Log, channel: str) -> float:

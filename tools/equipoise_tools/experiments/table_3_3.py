@@ -76,8 +76,7 @@ def cases() -> list[Case]:
 
 
 def measure(lab: Lab) -> Data:
-    data = Data()
-    lab.run(cases(), data)
+    data = lab.run(cases())
     add_offsets(data)
     return data
 

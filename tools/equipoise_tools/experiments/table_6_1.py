@@ -97,7 +97,6 @@ def our_case(row: tuple) -> str:
 
 
 def measure(lab: Lab) -> Data:
-    data = Data()
     world = {"include": '["fragments/table_6_1.toml"]'}
     sets = {**world, **NO_GATES}
     cases = []
@@ -117,8 +116,7 @@ def measure(lab: Lab) -> Data:
                 trace_s=(0.0, 25.0),
             )
         )  # fmt: skip
-    lab.run(cases, data)
-    return data
+    return lab.run(cases)
 
 
 def report(data: Data, out_dir: Path) -> Result:

@@ -84,8 +84,7 @@ def cases() -> list[Case]:
 
 
 def measure(lab: Lab) -> Data:
-    data = Data()
-    lab.run(cases(), data)
+    data = lab.run(cases())
     for drive in DRIVE_MPS:
         data.add(case_name(drive), "passing_rate_rad_s", passing_rate(drive), Ran(world="geometry"))
     return data
