@@ -9,7 +9,7 @@ from .campaign_statistics import wilson
 from .reliability_part import BINARY, CONFIGS, Part, output
 
 # Of the robots that no limit was chosen on; the typical one is part of `faults`.
-HELD_OUT = 201
+HELD_OUT = 7001
 POPULATION_FAULTS = (
     *(f"gyro_{axis}_{what}" for what in ("frozen", "zero", "flipped") for axis in "xyz"),
     *("gyro_xy_swapped", "gyro_yz_swapped", "gyro_zx_swapped", "gyro_ramp", "bias_jump", "noise_burst"),

@@ -12,7 +12,7 @@
 namespace equipoise::app {
 EventDevice::EventDevice(RemoteFile file) : file_(std::move(file)), controls_(file_.events.size()) {
   const int status = open();
-  if (status == -ENOTTY)
+  if (status == -ENOTTY || status == -ENOSYS)  // the latter under qemu-arm
     throw InputError(file_.device +
                      ": does not say how far its axes go; add axis_range = [LOW, HIGH] to [events]");
   if (status == -EINVAL) throw InputError(file_.device + ": has not the axes that [events] names");
