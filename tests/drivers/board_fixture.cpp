@@ -2,16 +2,9 @@
 
 #include <monotonic.h>
 
-namespace {
-bbb_pin_t pin(const char* chip, uint32_t line, bool active_low = false) {
-  bbb_pin_t out{};
-  out.used = true;
-  snprintf(out.chip, sizeof out.chip, "%s", chip);
-  out.line = line;
-  out.active_low = active_low;
-  return out;
-}
+#include "support/pin.hpp"
 
+namespace {
 bbb_motor_t motor(bbb_pin_t in1, bbb_pin_t in2, bbb_pin_t fault, const char* pwm, uint32_t channel,
                   const char* encoder) {
   bbb_motor_t out{};
@@ -54,17 +47,18 @@ void BoardFixture::resetBoard() {
   c.gyro_range_dps = 2000;
   c.accel_range_g = 8;
   c.dlpf = 2;
-  c.interrupt = pin(kGpio3, 21, true);
+  c.interrupt = pin_of(kGpio3, 21, true);
   c.late_after_us = 1000;
   config_.motors = 3;
   config_.motor[0] =
-      motor(pin(kGpio1, 28), pin(kGpio0, 31), pin(kGpio1, 17, true), "48302200", 0, "48300180");
+      motor(pin_of(kGpio1, 28), pin_of(kGpio0, 31), pin_of(kGpio1, 17, true), "48302200", 0, "48300180");
   config_.motor[1] =
-      motor(pin(kGpio1, 16), pin(kGpio2, 17), pin(kGpio3, 17, true), "48302200", 1, "48302180");
-  config_.motor[2] = motor(pin(kGpio2, 9), pin(kGpio2, 8), pin(kGpio3, 16, true), "48304200", 0, "48304180");
+      motor(pin_of(kGpio1, 16), pin_of(kGpio2, 17), pin_of(kGpio3, 17, true), "48302200", 1, "48302180");
+  config_.motor[2] =
+      motor(pin_of(kGpio2, 9), pin_of(kGpio2, 8), pin_of(kGpio3, 16, true), "48304200", 0, "48304180");
   config_.motor[2].encoder_reversed = true;
   config_.pwm_hz = 20000;
-  config_.enable = pin(kGpio0, 20);
+  config_.enable = pin_of(kGpio0, 20);
   snprintf(config_.adc, sizeof config_.adc, "TI-am335x-adc");
   config_.battery_channel = 6;
   config_.battery_every_ticks = 20;

@@ -11,6 +11,8 @@
 #include <cstring>
 #include <fstream>
 
+#include "support/pin.hpp"
+
 namespace {
 const std::string kDebug = "/sys/kernel/debug/robot_bench/";
 constexpr unsigned kDataReadyLine = 21;
@@ -54,15 +56,6 @@ void unexportAll() {
   }
 }
 }  // namespace
-
-bbb_pin_t pinOf(const char* chip, uint32_t line, bool active_low) {
-  bbb_pin_t out{};
-  out.used = true;
-  snprintf(out.chip, sizeof out.chip, "%s", chip);
-  out.line = line;
-  out.active_low = active_low;
-  return out;
-}
 
 Bench::Bench() {
   unexportAll();
@@ -163,12 +156,12 @@ bbb_config_t Bench::mbbr() {
   config.imu.gyro_range_dps = 2000;
   config.imu.accel_range_g = 8;
   config.imu.dlpf = 2;
-  config.imu.interrupt = pinOf(kGpio3, kDataReadyLine, true);
+  config.imu.interrupt = pin_of(kGpio3, kDataReadyLine, true);
   config.imu.late_after_us = 200000;  // emulation is slow: an edge is late when it does not come at all
   config.motors = 3;
-  const bbb_pin_t in1[] = {pinOf(kGpio1, 28), pinOf(kGpio1, 16), pinOf(kGpio2, 9)};
-  const bbb_pin_t in2[] = {pinOf(kGpio0, 31), pinOf(kGpio2, 17), pinOf(kGpio2, 8)};
-  const bbb_pin_t sf[] = {pinOf(kGpio1, 17, true), pinOf(kGpio3, 17, true), pinOf(kGpio3, 16, true)};
+  const bbb_pin_t in1[] = {pin_of(kGpio1, 28), pin_of(kGpio1, 16), pin_of(kGpio2, 9)};
+  const bbb_pin_t in2[] = {pin_of(kGpio0, 31), pin_of(kGpio2, 17), pin_of(kGpio2, 8)};
+  const bbb_pin_t sf[] = {pin_of(kGpio1, 17, true), pin_of(kGpio3, 17, true), pin_of(kGpio3, 16, true)};
   const char* pwm[] = {"48302200", "48302200", "48304200"};
   const uint32_t channel[] = {0, 1, 0};
   const char* encoder[] = {"48300180", "48302180", "48304180"};
@@ -183,7 +176,7 @@ bbb_config_t Bench::mbbr() {
     snprintf(motor.encoder, sizeof motor.encoder, "%s", encoder[i]);
   }
   config.pwm_hz = 20000;
-  config.enable = pinOf(kGpio0, 20);
+  config.enable = pin_of(kGpio0, 20);
   snprintf(config.adc, sizeof config.adc, "TI-am335x-adc");
   config.battery_channel = 6;
   config.battery_every_ticks = 20;

@@ -13,8 +13,6 @@
 #include <thread>
 #include <vector>
 
-bbb_pin_t pinOf(const char* chip, uint32_t line, bool active_low = false);
-
 class Bench {
  public:
   struct Channel {

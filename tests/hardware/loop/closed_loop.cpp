@@ -5,6 +5,7 @@
 
 #include "app/board/board.hpp"
 #include "robots/robot_list.hpp"
+#include "support/pin.hpp"
 
 using equipoise::MotorCommand;
 using equipoise::RawSample;
@@ -19,18 +20,18 @@ PinRobot PinRobot::mbbr() {
   return {"Mbbr",
           "/mnt/config/mbbr.toml",
           "/mnt/config/boards/robotics_cape_mbbr.toml",
-          {{kPwm1A, pinOf(kGpio1, 28), pinOf(kGpio0, 31), +1, 0, +1},
-           {kPwm1B, pinOf(kGpio1, 16), pinOf(kGpio2, 17), +1, 1, +1},
-           {kPwm2A, pinOf(kGpio2, 9), pinOf(kGpio2, 8), +1, 2, +1}},
-          {pinOf(kGpio1, 17), pinOf(kGpio3, 17), pinOf(kGpio3, 16)}};
+          {{kPwm1A, pin_of(kGpio1, 28), pin_of(kGpio0, 31), +1, 0, +1},
+           {kPwm1B, pin_of(kGpio1, 16), pin_of(kGpio2, 17), +1, 1, +1},
+           {kPwm2A, pin_of(kGpio2, 9), pin_of(kGpio2, 8), +1, 2, +1}},
+          {pin_of(kGpio1, 17), pin_of(kGpio3, 17), pin_of(kGpio3, 16)}};
 }
 
 PinRobot PinRobot::edumip() {
   return {"Edumip",
           "/mnt/config/edumip.toml",
           "/mnt/config/boards/robotics_cape_edumip.toml",
-          {{kPwm2A, pinOf(kGpio2, 9), pinOf(kGpio2, 8), -1, 2, +1},
-           {kPwm1B, pinOf(kGpio1, 16), pinOf(kGpio2, 17), +1, 1, -1}},
+          {{kPwm2A, pin_of(kGpio2, 9), pin_of(kGpio2, 8), -1, 2, +1},
+           {kPwm1B, pin_of(kGpio1, 16), pin_of(kGpio2, 17), +1, 1, -1}},
           {}};
 }
 
@@ -38,7 +39,7 @@ PinRobot PinRobot::edumip_blue() {
   PinRobot robot = edumip();
   robot.name = "EdumipBlue";
   robot.board = "/mnt/config/boards/beaglebone_blue_edumip.toml";
-  robot.wheels[1].in2 = pinOf(kGpio0, 10);
+  robot.wheels[1].in2 = pin_of(kGpio0, 10);
   return robot;
 }
 
