@@ -96,7 +96,7 @@ class GyroWatch {
       if (ok) continue;
       z.gyro_B_rad_s(axis) = expected_rad_s(axis);
       left_out_ = true;
-      needed = needed || p_.balances[i];
+      needed = needed || (p_.balances[i] && std::abs(step(axis)) > kMoves_rad_s);
     }
     ticks_out_ = left_out_ ? ticks_out_ + 1 : 0;
     without_ = needed ? without_ + 1 : 0;
@@ -166,7 +166,10 @@ class GyroWatch {
   static constexpr int kMirrored = 3;        // ticks
   static constexpr int kMaxImpossible = 3;   // samples in a row
   static constexpr int kGone = 6;  // an axis that was so wrong for so long is not believed when it slows down
-  static constexpr int kMaxWithout = 4;            // ticks
+  // Ticks without an axis that balances, while it is wrong by so much: a quiet gyro on a robot that stands
+  // quite still repeats itself, and harms nobody.
+  static constexpr int kMaxWithout = 4;
+  static constexpr double kMoves_rad_s = 0.05;
   static constexpr int kReported = 4;              // ticks
   static constexpr double kNoiseMean = 0.05;       // of second differences, 20 ticks
   static constexpr double kMostNoise_rad_s = 1.0;  // one bad sample of ten stays below 0.42

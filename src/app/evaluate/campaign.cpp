@@ -233,6 +233,7 @@ int campaign(const CampaignArguments& a) {
       {"robot", Firmware::kName}, {"cases", cases}, {"case_count", cases.size()}, {"unsafe", unsafe}};
   std::string summary =
       std::to_string(cases.size()) + " fault x phase cases, " + std::to_string(unsafe) + " unsafe";
+  std::string soak_runs;
   if (a.soak_h > 0.0) {
     const Soak s = soak<Firmware>(configs[0], a.fidelity, a.soak_h, a.seed);
     out["soak"] = {{"hours", s.hours},
@@ -249,10 +250,11 @@ int campaign(const CampaignArguments& a) {
                   static_cast<long long>(s.unsafe), static_cast<long long>(s.unexplained));
     summary += line;
     unsafe += static_cast<int>(s.unsafe + s.unexplained);
+    for (const nlohmann::json& run : s.to_explain) soak_runs += "- " + run.dump() + "\n";
   }
   if (!a.markdown.empty()) {
     std::ofstream file(a.markdown);
-    file << "## " << Firmware::kName << "\n" << summary << ".\n\n" << table;
+    file << "## " << Firmware::kName << "\n" << summary << ".\n" << soak_runs << "\n" << table;
     if (!file.flush()) throw InputError(a.markdown + ": cannot be written");
   }
   std::fprintf(a.json == "-" ? stderr : stdout, "%s: %s\n", Firmware::kName, summary.c_str());

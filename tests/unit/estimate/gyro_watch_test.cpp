@@ -244,6 +244,27 @@ TEST(GyroWatchTest, ATiltAxisMayBeAwayForFourTicksOnly) {
   EXPECT_EQ(twist.run([](const Vec3& omega) { return Vec3(omega.x() + 9.0, omega.y(), omega.z()); }), 5);
 }
 
+/// Its count repeats itself: a quiet gyro on a robot that stands quite still, or a dead one.
+TEST(GyroWatchTest, AnAxisThatStandsStillMattersOnceTheRobotMoves) {
+  GyroWatch<3> watch(Twist::params());
+  Measurement<3> z;
+  z.imu_ok = true;
+  z.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
+  const auto turns_by = [&](double rate_rad_s) {
+    z.gyro_B_rad_s = Vec3::Zero();
+    z.gyro_axis_ok = {false, true, true};
+    watch.screen(z, Vec3(rate_rad_s, 0.0, 0.0));
+    EXPECT_EQ(z.gyro_B_rad_s.x(), rate_rad_s);
+  };
+  for (int i = 0; i < 1000; ++i) turns_by(0.02);
+  EXPECT_TRUE(watch.trusted());
+  EXPECT_TRUE(watch.left_out());
+  for (int i = 0; i < 4; ++i) turns_by(0.06);
+  EXPECT_TRUE(watch.trusted());
+  turns_by(0.06);
+  EXPECT_FALSE(watch.trusted());
+}
+
 TEST(GyroWatchTest, RejectsGarbageUnlessItLasts) {
   GyroWatch<3> watch(Twist::params());
   Measurement<3> garbage;
