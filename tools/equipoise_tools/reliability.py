@@ -213,7 +213,7 @@ def pytest_output(file: str, pattern: str) -> str:
 def blackbox(_: argparse.Namespace) -> Part:
     part = Part()
     told = re.findall(
-        r"^(\d+) kills under load (\d+): at most (\S+) ms lost, mean (\S+) ms",
+        r"^\.?(\d+) kills under load (\d+): at most (\S+) ms lost, mean (\S+) ms",
         pytest_output("test_blackbox_killed", "sigkill"),
         re.M,
     )
