@@ -13,7 +13,7 @@ namespace {
 template <class Parse>
 bool readable(Parse&& parse, const std::string& text) {
   try {
-    (void)parse(text, "fuzz.toml");
+    (void)parse(text, "fuzz.toml", {});
     return true;
   } catch (const equipoise::ConfigError&) {
     return false;

@@ -75,8 +75,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       m.sequence = (how & 64U) != 0 ? bytes.number<std::int64_t>() : newest[m.sender] + (bytes.byte() % 4);
       m.turn = before.turn - ((how & 128U) != 0 ? bytes.byte() % 3 : 0);
       m.action = static_cast<std::int8_t>(bytes.byte() % 6);
-      m.velocity_W_m_s[0] = bytes.number<float>();
-      m.yaw_rate_rad_s = bytes.number<float>();
+      m.velocity_W_m_s[0] = static_cast<double>(bytes.number<float>());
+      m.yaw_rate_rad_s = static_cast<double>(bytes.number<float>());
       set_name("anna", &m.holder);
       sign(keys, "robot", &m);
       said.push_back(m);

@@ -172,6 +172,8 @@ def fuzz(options: argparse.Namespace) -> Part:
         part.rows.append((f"fuzzing: {target}", wanted, f"{int(executions):.2e}, no finding", holds))
     for target in re.findall(r"^(\w+) +FINDING", text, re.M):
         part.rows.append((f"fuzzing: {target}", "no finding", "a finding", False))
+    if not part.rows:
+        part.rows.append(("fuzzing", "no finding", "not measured: tools/fuzz failed", False))
     return part
 
 
