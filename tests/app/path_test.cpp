@@ -1,6 +1,7 @@
 #include "app/run/path.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -15,7 +16,7 @@ constexpr PathLimits kAnything{10.0, 100.0, 100.0};
 constexpr double kSpeed_m_s = 0.1;
 
 std::string waypoint_file(const std::string& text) {
-  const std::string name = testing::TempDir() + "waypoints.txt";
+  const std::string name = testing::TempDir() + "waypoints_" + std::to_string(::getpid());
   std::ofstream(name) << text;
   return name;
 }

@@ -1,6 +1,7 @@
 // Runs in which the runtime intervened (overrun, failing write, old command, full log) replay bit for bit:
 // the log holds everything the tick saw.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -64,7 +65,8 @@ class FaultReplay : public testing::Test {};
 TYPED_TEST_SUITE(FaultReplay, TestRobots);
 
 TYPED_TEST(FaultReplay, IsBitExactWhereTheRuntimeIntervened) {
-  const std::string path = testing::TempDir() + "fault-replay-" + TypeParam::kName + ".lcm";
+  const std::string path =
+      testing::TempDir() + "fault-replay-" + std::to_string(::getpid()) + TypeParam::kName + ".lcm";
   for (const FaultKind fault : kInterventions) {
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
       SCOPED_TRACE(std::string(app::kFaults[static_cast<std::size_t>(fault)].name) + " seed " +

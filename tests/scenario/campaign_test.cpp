@@ -2,6 +2,7 @@
 // a fault nothing is found.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -14,7 +15,7 @@ namespace {
 
 /// The JSON of `equipoise campaign`; `status`, where wanted: its exit status.
 nlohmann::json result(const std::string& robot, const std::string& arguments, int* status = nullptr) {
-  const std::string json = ::testing::TempDir() + "campaign-" + robot + ".json";
+  const std::string json = ::testing::TempDir() + "campaign-" + robot + std::to_string(::getpid()) + ".json";
   const std::string command = std::string(EQUIPOISE_BINARY) + " campaign --config " +
                               EQUIPOISE_SOURCE_DIR "/config/" + robot + ".toml " + arguments + " --json " +
                               json + " > " + json + ".txt";

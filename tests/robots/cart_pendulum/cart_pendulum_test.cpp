@@ -1,5 +1,6 @@
 // The third robot through the production pipeline, loop, simulation, log and replay.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -44,7 +45,7 @@ TEST(CartPendulum, FallsWithoutItsFeedback) {
 }
 
 TEST(CartPendulum, ItsLogReplaysBitForBit) {
-  const std::string path = testing::TempDir() + "cart-pendulum.lcm";
+  const std::string path = testing::TempDir() + "cart-pendulum-" + std::to_string(::getpid()) + ".lcm";
   const auto loaded = CartPendulumFirmware::load(config_file<CartPendulumFirmware>(), {});
   runtime::TelemetryOptions options;
   options.log_path = path;
