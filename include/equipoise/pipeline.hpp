@@ -137,8 +137,10 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   MotorCommand invert_bridges(Result& t) const noexcept {
     const double supply = bridge_.supply_V(t.z.battery_V, t.z.battery_ok);
-    const Wheels u = within_supply(t.u_friction, supply / p_.motor.nominal_V);
-    t.saturated = (u - kinematics_.wheels_from_axes(t.u_friction)).cwiseAbs().maxCoeff() > 1e-9;
+    const double limit = supply / p_.motor.nominal_V;
+    const Wheels asked = kinematics_.wheels_from_axes(t.u_friction);
+    t.saturated = asked.cwiseAbs().maxCoeff() > limit;
+    const Wheels u = t.saturated ? within_supply(t.u_friction, limit) : asked;
     MotorCommand motors{};
     for (int i = 0; i < Robot::kWheels; ++i) {
       const auto k = static_cast<std::size_t>(i);

@@ -27,8 +27,26 @@ class Turn {
   explicit Turn(double angle_rad) noexcept : c_(std::cos(angle_rad)), s_(std::sin(angle_rad)) {}
   Vec2 operator()(const Vec2& v) const noexcept { return {c_ * v.x() - s_ * v.y(), s_ * v.x() + c_ * v.y()}; }
   Vec2 back(const Vec2& v) const noexcept { return {c_ * v.x() + s_ * v.y(), c_ * v.y() - s_ * v.x()}; }
+  /// Of what turns within a tick: to 1e-10 up to 0.2 rad, by series.
+  static Turn small(double angle_rad) noexcept {
+    const double a2 = angle_rad * angle_rad;
+    return {1.0 - a2 * (0.5 - a2 * (1.0 / 24.0 - a2 * (1.0 / 720.0))),
+            angle_rad * (1.0 - a2 * (1.0 / 6.0 - a2 * (1.0 / 120.0 - a2 * (1.0 / 5040.0))))};
+  }
+  /// `angle`, when this one turns by little: exact to the last digit or so up to 0.03 rad, else anew.
+  Turn near(double angle_rad, double by) const noexcept {
+    return std::abs(by) < 0.03 ? *this * small(by) : Turn(angle_rad);
+  }
+  /// This one and then the other.
+  Turn operator*(const Turn& then) const noexcept {
+    return {c_ * then.c_ - s_ * then.s_, s_ * then.c_ + c_ * then.s_};
+  }
+  double cosine() const noexcept { return c_; }
+  double sine() const noexcept { return s_; }
 
  private:
+  Turn(double c, double s) noexcept : c_(c), s_(s) {}
+
   double c_, s_;
 };
 

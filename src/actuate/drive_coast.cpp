@@ -33,7 +33,7 @@ double scaled_current(double t, double b, double d) noexcept {
 }
 
 /// s with scaled_current = r^2 / 2, six terms.
-double inverse_series(double r, double b) noexcept {
+inline double inverse_series(double r, double b) noexcept {
   const double p = 1.0 + b;
   const double b2 = b * b;
   const double q = 1.0 + b2;
@@ -107,6 +107,20 @@ double solve_at_edge(double target, double b, double d, double exponent_max, int
   return std::log1p(b * std::expm1(t));
 }
 
+/// (4.27) without its logarithm, as in DriveCoastCommand, and hardly ever with its exponential: of the series
+/// x / expm1(x) = 1 - x/2 + x^2/12 - x^4/720 + ... three terms are too many and four too few for x < 0.
+bool discontinuous(double T_r, double full_decay, double v, double b, double d) noexcept {
+  if (!(T_r > 0.0)) return v < b;
+  const double x = (v - 1.0) * T_r;
+  const double limit = -d * full_decay;
+  if (x >= 0.0) return false;
+  const double x2 = x * x;
+  const double above = limit * (1.0 - 0.5 * x + x2 * (1.0 / 12.0));
+  if (x < above) return true;
+  if (x > above - limit * x2 * x2 * (1.0 / 720.0)) return false;
+  return std::expm1(x) < limit;
+}
+
 }  // namespace
 
 DriveCoastCommand::DriveCoastCommand(double T_r, double u) noexcept
@@ -135,16 +149,6 @@ double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept {
 
 DriveCoastInverse::DriveCoastInverse(double T_r) noexcept : T_r_(T_r), full_decay_(-std::expm1(-T_r)) {}
 
-/// (4.27) without its logarithm, as in DriveCoastCommand, and most often without its exponential: x / (1 - x)
-/// is above expm1(x), and x below it.
-bool DriveCoastInverse::discontinuous(double v, double b, double d) const noexcept {
-  if (!(T_r_ > 0.0)) return v < b;
-  const double x = (v - 1.0) * T_r_;
-  const double limit = -d * full_decay_;
-  if (x >= limit) return false;
-  return x < limit * (1.0 - x) || std::expm1(x) < limit;
-}
-
 DriveCoastSolution DriveCoastInverse::solve(double omega_r, double i_over_is) const noexcept {
   if (i_over_is == 0.0) return {};
   const double sign = i_over_is < 0.0 ? -1.0 : 1.0;
@@ -153,7 +157,7 @@ DriveCoastSolution DriveCoastInverse::solve(double omega_r, double i_over_is) co
   const double b = 0.5 * (1.0 + w);
   const double d = 0.5 * (1.0 - w);
   const double v_continuous = 0.5 * (g + 1.0 + w);  // (4.29)
-  if (!discontinuous(v_continuous, b, d)) {
+  if (!discontinuous(T_r_, full_decay_, v_continuous, b, d)) {
     if (v_continuous > 1.0) return {sign, 0, false};
     return {sign * v_continuous, 0, true};
   }

@@ -6,23 +6,21 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 
+#include "equipoise/runtime/big_endian.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 
 namespace equipoise::runtime {
 namespace {
 
 constexpr std::uint32_t kSync = 0xEDA1DA01U;
+constexpr std::size_t kHeaderBytes = 28;  // sync, number, time, two lengths
 constexpr auto kRoomCheckPeriod = std::chrono::seconds(1);
 constexpr auto kSyncPeriod = std::chrono::milliseconds(50);
-
-template <class Unsigned>
-void put(Unsigned value, std::vector<std::uint8_t>* out) {
-  for (std::size_t i = sizeof value; i-- > 0;) out->push_back(static_cast<std::uint8_t>(value >> (8U * i)));
-}
 
 /// 0, or errno: EWOULDBLOCK where another process writes it, for which it holds a lock.
 int end_of_writing(const std::string& part, std::int64_t* time_s) {
@@ -100,13 +98,17 @@ void LogWriter::preamble(std::int64_t utime, std::string_view channel,
 
 void LogWriter::event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data) {
   if (!is_open()) return;
-  put(kSync, &tick_);
-  put(static_cast<std::uint64_t>(event_number_++), &tick_);
-  put(static_cast<std::uint64_t>(utime), &tick_);
-  put(static_cast<std::uint32_t>(channel.size()), &tick_);
-  put(static_cast<std::uint32_t>(data.size()), &tick_);
-  tick_.insert(tick_.end(), channel.begin(), channel.end());
-  tick_.insert(tick_.end(), data.begin(), data.end());
+  const std::size_t before = used_;
+  used_ += kHeaderBytes + channel.size() + data.size();
+  if (used_ > tick_.size()) tick_.resize(2 * used_);
+  std::uint8_t* at = tick_.data() + before;
+  at = store_big_endian(kSync, at);
+  at = store_big_endian(static_cast<std::uint64_t>(event_number_++), at);
+  at = store_big_endian(static_cast<std::uint64_t>(utime), at);
+  at = store_big_endian(static_cast<std::uint32_t>(channel.size()), at);
+  at = store_big_endian(static_cast<std::uint32_t>(data.size()), at);
+  std::memcpy(at, channel.data(), channel.size());
+  std::copy(data.begin(), data.end(), at + channel.size());
 }
 
 void LogWriter::end_tick() {
@@ -119,8 +121,8 @@ void LogWriter::end_tick() {
 
 void LogWriter::write_out() {
   std::size_t done = 0;
-  while (is_open() && done < tick_.size()) {
-    const ssize_t written = ::write(fd_, tick_.data() + done, tick_.size() - done);
+  while (is_open() && done < used_) {
+    const ssize_t written = ::write(fd_, tick_.data() + done, used_ - done);
     if (written > 0) {
       done += static_cast<std::size_t>(written);
     } else if (written == 0 || errno != EINTR) {
@@ -130,7 +132,7 @@ void LogWriter::write_out() {
     }
   }
   if (is_open()) file_bytes_ += static_cast<std::int64_t>(done);
-  tick_.clear();
+  used_ = 0;
 }
 
 void LogWriter::fail(int error) {

@@ -56,7 +56,8 @@ class LogWriter {
   std::string preamble_channel_;
   std::vector<std::uint8_t> preamble_;
   std::int64_t preamble_utime_ = 0;
-  std::vector<std::uint8_t> tick_;  // its events
+  std::vector<std::uint8_t> tick_;  // its events, the first `used_` bytes
+  std::size_t used_ = 0;
   int part_ = 0;
   int oldest_part_ = 0;
   std::int64_t event_number_ = 0;

@@ -2,6 +2,7 @@
 // usage: instruction_count ROBOT CONFIG PART TIMES
 //   run      ticks of the simulated robot and the pipeline, armed after 100, turning at 1 Hz
 //   ticks    the same, and the recorded samples once more through a fresh pipeline
+//   plant-F  ticks of the simulated robot alone, F: its fidelity; it starts anew before it has fallen
 //   packed   steps of the default filter as it runs
 //   dense    the same steps of the same model in KalmanFilter, Eigen
 //   bridge   inversions of the drive/coast bridge within its curved region
@@ -82,6 +83,26 @@ void ticks(const std::string& file, int times, bool again) {
   });
 }
 
+template <class Firmware>
+void plant(const std::string& file, const std::string& fidelity, int times) {
+  constexpr int kEpisode = 80;
+  Choice choice;
+  choice.estimator = Firmware::kDefaultEstimator;
+  choice.controller = Firmware::kDefaultController;
+  choice.fidelity = fidelity;
+  const auto config = Firmware::apply(Firmware::load(file, {}).config, choice);
+  const auto start = Firmware::world(config, fidelity_level(fidelity), 1);
+  auto world = start;
+  MotorCommand motors{};
+  motors.enable = 1;
+  motors.duty[0] = 0.05;
+  for (int k = 0; k < times; ++k) {
+    if (k % kEpisode == 0) world = start;
+    world.advance(motors);
+  }
+  if (world.time_s() == 0.0) throw std::runtime_error("the plant stood still");
+}
+
 template <class Filter>
 void steps(Filter filter, int times) {
   constexpr int p = Filter::p;
@@ -157,9 +178,10 @@ void bridges(const std::string& how, int times) {
 template <class Firmware>
 void count(const std::string& file, const std::string& part, int times) {
   if (part == "run" || part == "ticks") return ticks<Firmware>(file, times, part == "ticks");
+  if (part.rfind("plant-", 0) == 0) return plant<Firmware>(file, part.substr(6), times);
   if (part == "packed" || part == "dense") return filter(file, part, times, Firmware{});
   if (part == "bridge" || part == "newton") return bridges(part, times);
-  throw std::runtime_error(part + ": no part; run, ticks, packed, dense, bridge or newton");
+  throw std::runtime_error(part + ": no part; run, ticks, plant-FIDELITY, packed, dense, bridge or newton");
 }
 
 }  // namespace

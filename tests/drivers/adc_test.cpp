@@ -39,7 +39,9 @@ TEST_F(AdcTest, DescriptorZeroIsOneLikeAnyOtherAndIsClosedOnce) {
 }
 
 TEST_F(AdcTest, ReportsMissingDeviceAndChannel) {
+  adc_.fd = 77;
   EXPECT_EQ(adc_open(&adc_, "TI-am335x-adc", 6), -ENODEV);
+  EXPECT_EQ(adc_.fd, -1) << "whatever was there before";
   addAdc("TI-am335x-adc", 0);
   EXPECT_EQ(adc_open(&adc_, "TI-am335x-adc", 8), -ENOENT);
 }

@@ -2,10 +2,14 @@
 #include "can.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
+#include <signal.h>
 #include <sys/socket.h>
 #include <unistd.h>
+
+#include "syscall_journal.hpp"
 
 namespace {
 can_frame errorFrame(canid_t kind, uint8_t controller = 0, uint8_t tx = 0, uint8_t rx = 0) {
@@ -86,6 +90,57 @@ TEST_F(CanTest, RefusesLongFramesAndTornOnes) {
   EXPECT_EQ(can_receive(&port_, &frame), -EBADMSG);
   arrive(frame);
   EXPECT_EQ(can_receive(&port_, &frame), -EBADMSG);
+}
+
+TEST_F(CanTest, AFrameMayHaveEightBytes) {
+  can_frame frame = dataFrame(1, 1);
+  frame.can_dlc = 8;
+  ASSERT_EQ(can_send(&port_, &frame), 0);
+  arrive(frame);
+  ASSERT_EQ(can_receive(&port_, &frame), 0);
+  EXPECT_EQ(frame.can_dlc, 8);
+}
+
+TEST_F(CanTest, ABrokenPortIsToldAndNoDrop) {
+  close(bus_);
+  const can_frame frame = dataFrame(1, 1);
+  signal(SIGPIPE, SIG_IGN);
+  EXPECT_EQ(can_send(&port_, &frame), -EPIPE);
+  signal(SIGPIPE, SIG_DFL);
+  EXPECT_EQ(port_.dropped, 0u);
+  bus_ = open("/dev/null", O_RDWR);
+}
+
+TEST_F(CanTest, IsClosedOnce) {
+  SyscallJournal& journal = SyscallJournal::instance();
+  journal.clear();
+  journal.opened(port_.fd);
+  can_close(&port_);
+  EXPECT_EQ(port_.fd, -1);
+  can_close(&port_);
+  EXPECT_EQ(journal.openFiles(), 0);
+  EXPECT_EQ(journal.strayCloses(), 0);
+}
+
+TEST(CanState, EveryCounterOfTheControllerIsKept) {
+  can_port_t port{};
+  can_frame frame = errorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE, 12, 130);
+  can_update_state(&port, &frame);
+  EXPECT_EQ(port.state, CAN_BUS_PASSIVE);
+  EXPECT_EQ(port.tx_errors, 12);
+  EXPECT_EQ(port.rx_errors, 130);
+  EXPECT_EQ(port.rx_overruns, 0u);
+  frame = errorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE, 131, 1);
+  can_update_state(&port, &frame);
+  EXPECT_EQ(port.state, CAN_BUS_PASSIVE);
+  frame = errorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING);
+  can_update_state(&port, &frame);
+  EXPECT_EQ(port.state, CAN_BUS_WARNING);
+  frame = errorFrame(CAN_ERR_RESTARTED, CAN_ERR_CRTL_RX_OVERFLOW, 9, 9);
+  can_update_state(&port, &frame);
+  EXPECT_EQ(port.state, CAN_BUS_ACTIVE);
+  EXPECT_EQ(port.rx_overruns, 0u) << "the controller's byte counts in its own frames only";
+  EXPECT_EQ(port.tx_errors, 0);
 }
 
 TEST(CanState, FollowsTheControllerDownAndUpAgain) {

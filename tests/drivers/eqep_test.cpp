@@ -88,7 +88,9 @@ TEST_F(EqepTest, MinusOneIsACountNotAnError) {
 }
 
 TEST_F(EqepTest, ReportsAMissingDeviceOrAttribute) {
+  encoder_.fd = 77;
   EXPECT_EQ(eqep_open(&encoder_, "48300180"), -ENODEV);
+  EXPECT_EQ(encoder_.fd, -1) << "whatever was there before";
   for (const char* name : {"count0/enable", "count0/ceiling", "count0/count", "count0/function"}) {
     const std::string dir = addCounter("48300180", 0);
     removeAttribute(dir, name);
@@ -122,4 +124,70 @@ TEST_F(EqepTest, ReportsUnplugAndGarbageAndCountsOnAfterwards) {
   EXPECT_EQ(eqep_read(&encoder_, &counts), -ERANGE);
   EXPECT_EQ(counts, 77) << "no count without a reading";
   EXPECT_EQ(readAfter(dir, "count0/count", "110"), 110);
+}
+
+TEST_F(EqepTest, TakesTheCeilingThatTheDecoderKept) {
+  const std::string dir = addCounter("48300180", 0);
+  SyscallJournal::instance().onWrite("count0/ceiling", [&] { setAttribute(dir, "count0/ceiling", "999"); });
+  ASSERT_EQ(eqep_open(&encoder_, "48300180"), 0);
+  EXPECT_EQ(readAfter(dir, "count0/count", "999"), -1);
+  EXPECT_EQ(readAfter(dir, "count0/count", "3"), 3);
+  EXPECT_EQ(readAfter(dir, "count0/count", "503"), 503) << "half a turn counts forwards";
+  setAttribute(dir, "count0/count", "1000");
+  int64_t counts = 0;
+  EXPECT_EQ(eqep_read(&encoder_, &counts), -ERANGE);
+}
+
+TEST_F(EqepTest, ACeilingOfZeroIsNoCounter) {
+  const std::string dir = addCounter("48300180", 0);
+  const char* kept = "0";
+  SyscallJournal::instance().onWrite("count0/ceiling", [&] { setAttribute(dir, "count0/ceiling", kept); });
+  EXPECT_EQ(eqep_open(&encoder_, "48300180"), -ERANGE);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+  kept = "1";
+  EXPECT_EQ(eqep_open(&encoder_, "48300180"), 0);
+}
+
+TEST_F(EqepTest, ACountThatCannotBeReadAtFirstLeavesNothingOpen) {
+  const std::string dir = addCounter("48300180", 0);
+  setAttribute(dir, "count0/count", "none");
+  EXPECT_EQ(eqep_open(&encoder_, "48300180"), -EBADMSG);
+  EXPECT_EQ(encoder_.fd, -1);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+}
+
+TEST_F(EqepTest, OldKernelsReportRefusalsAndImpossiblePositionsToo) {
+  const std::string dir = addLegacyEqep("48304180");
+  SyscallJournal::instance().failWrite("/mode", EACCES);
+  EXPECT_EQ(eqep_open(&encoder_, "48304180"), -EACCES);
+  SyscallJournal::instance().failWrite("/enabled", EBUSY);
+  EXPECT_EQ(eqep_open(&encoder_, "48304180"), -EBUSY);
+  ASSERT_EQ(eqep_open(&encoder_, "48304180"), 0);
+  EXPECT_EQ(attribute(dir, "mode"), "0") << "absolute position";
+  setAttribute(dir, "position", "-4294967297");
+  int64_t counts = 0;
+  EXPECT_EQ(eqep_read(&encoder_, &counts), -ERANGE);
+  eqep_close(&encoder_);
+  removeAttribute(dir, "position");
+  EXPECT_EQ(eqep_open(&encoder_, "48304180"), -ENOENT);
+}
+
+TEST_F(EqepTest, DescriptorZeroIsOneLikeAnyOtherAndIsClosedOnce) {
+  const std::string dir = addCounter("48300180", 0);
+  {
+    const NoStdin none;
+    ASSERT_EQ(eqep_open(&encoder_, "48300180"), 0);
+    EXPECT_EQ(encoder_.fd, 0);
+    EXPECT_EQ(readAfter(dir, "count0/count", "3"), 3);
+    eqep_close(&encoder_);
+  }
+  EXPECT_EQ(encoder_.fd, -1);
+  eqep_close(&encoder_);
+  addLegacyEqep("48304180");
+  const NoStdin none;
+  ASSERT_EQ(eqep_open(&encoder_, "48304180"), 0);
+  EXPECT_EQ(encoder_.fd, 0);
+  eqep_close(&encoder_);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+  EXPECT_EQ(SyscallJournal::instance().strayCloses(), 0);
 }

@@ -2,12 +2,17 @@
 #include "events.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <umockdev.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <string>
+
+#include "monotonic.h"
+#include "syscall_journal.hpp"
 
 namespace {
 
@@ -73,5 +78,52 @@ TEST_F(EventsTest, TellsRangesAndEventsAndThatItIsGone) {
 }
 
 TEST_F(EventsTest, NamesWhatIsNotThere) { EXPECT_EQ(events_open(&events_, "/dev/input/event6"), -ENOENT); }
+
+/// A pipe in the place of a pad that is quiet.
+class QuietEvents : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    SyscallJournal::instance().clear();
+    path_ = ::testing::TempDir() + "equipoise_events_" + std::to_string(getpid());
+    ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+    pad_ = ::open(path_.c_str(), O_RDWR);
+    ASSERT_GE(pad_, 0);
+  }
+  void TearDown() override {
+    ::close(pad_);
+    unlink(path_.c_str());
+  }
+  std::string path_;
+  int pad_ = -1;
+};
+
+TEST_F(QuietEvents, NothingThereIsToldWithoutBlocking) {
+  events_t events{-1};
+  ASSERT_EQ(events_open(&events, path_.c_str()), 0);
+  input_event event{};
+  EXPECT_EQ(events_next(&events, &event), -EAGAIN);
+  const int64_t before_ns = monotonic_ns();
+  EXPECT_EQ(events_wait(&events, 5), 0);
+  EXPECT_GE(monotonic_ns() - before_ns, 4000000);
+  ASSERT_EQ(write(pad_, &event, sizeof event), ssize_t{sizeof event});
+  EXPECT_EQ(events_wait(&events, -1), 1);
+  EXPECT_EQ(events_next(&events, &event), 0);
+  input_absinfo about{};
+  EXPECT_EQ(events_axis(&events, ABS_Y, &about), -ENOTTY) << "a pipe has no axes";
+  events_close(&events);
+}
+
+TEST_F(QuietEvents, DescriptorZeroIsOneLikeAnyOtherAndIsClosedOnce) {
+  const NoStdin none;
+  events_t events{-1};
+  ASSERT_EQ(events_open(&events, path_.c_str()), 0);
+  EXPECT_EQ(events.fd, 0);
+  events_close(&events);
+  EXPECT_EQ(events.fd, -1);
+  events_close(&events);
+  EXPECT_EQ(SyscallJournal::instance().strayCloses(), 0);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+  EXPECT_EQ(SyscallJournal::instance().inheritable(), 0);
+}
 
 }  // namespace

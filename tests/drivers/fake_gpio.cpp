@@ -53,7 +53,8 @@ int gpio_open_output(gpio_line_t* line, const gpio_pin_t* pin, bool active) {
 
 int gpio_open_input(gpio_line_t* line, const gpio_pin_t* pin) { return request(line, pin, false, false); }
 
-int gpio_open_edge(gpio_line_t* line, const gpio_pin_t* pin, enum gpio_edge) {
+int gpio_open_edge(gpio_line_t* line, const gpio_pin_t* pin, enum gpio_edge edge) {
+  FakeGpio::instance().line(pin->chip, pin->offset).edge = edge;
   return request(line, pin, false, false);
 }
 

@@ -16,6 +16,7 @@ class FakeGpio {
     bool output = false;
     bool active_low = false;
     bool active = false;
+    int edge = -1;       // of an edge line: gpio_edge
     int open_error = 0;  // negative errno
     int use_error = 0;
   };

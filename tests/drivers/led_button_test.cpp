@@ -44,6 +44,40 @@ TEST_F(LedButtonTest, LedReportsWhatIsMissing) {
   EXPECT_EQ(led_open(&led, "red", &pin_), -EBUSY);
 }
 
+TEST_F(LedButtonTest, LedStartsDarkAndIsClosedOnce) {
+  const std::string dir = addLed("red");
+  setAttribute(dir, "brightness", "1");
+  const NoStdin none;
+  led_t led;
+  ASSERT_EQ(led_open(&led, "red", nullptr), 0);
+  EXPECT_EQ(led.fd, 0) << "a descriptor like any other";
+  EXPECT_EQ(attribute(dir, "brightness"), "0");
+  ASSERT_EQ(led_set(&led, true), 0);
+  EXPECT_EQ(attribute(dir, "brightness"), "1");
+  led_close(&led);
+  EXPECT_EQ(led.fd, -1);
+  EXPECT_EQ(attribute(dir, "brightness"), "0");
+  led_close(&led);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+  EXPECT_EQ(SyscallJournal::instance().strayCloses(), 0);
+}
+
+TEST_F(LedButtonTest, LedNameThatIsTooLongIsAnError) {
+  led_t led;
+  EXPECT_EQ(led_open(&led, std::string(300, 'x').c_str(), &pin_), -ENAMETOOLONG);
+}
+
+TEST_F(LedButtonTest, AButtonThatCannotBeReadIsNotHeld) {
+  FakeGpio::Line& line = FakeGpio::instance().line("gpio2", 2);
+  button_t button;
+  line.open_error = -EBUSY;
+  EXPECT_EQ(button_open(&button, &pin_, 2), -EBUSY);
+  line.open_error = 0;
+  line.use_error = -EIO;
+  EXPECT_EQ(button_open(&button, &pin_, 2), -EIO);
+  EXPECT_FALSE(line.held);
+}
+
 TEST(ButtonFilter, ReportsAPressOnceAndIgnoresBounce) {
   button_filter_t filter{};
   filter.stable_polls = 3;

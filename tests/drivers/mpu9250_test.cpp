@@ -170,14 +170,16 @@ TEST_F(Mpu9250Test, RefusesImpossibleConfigurations) {
 TEST_F(Mpu9250Test, ReportsMissingBusAndAdapterWithoutPlainI2c) {
   mpu9250_config_t config = kConfig;
   config.bus = "/dev/i2c-9";
+  chip_.i2c.fd = 77;
   EXPECT_EQ(mpu9250_open(&chip_, &config), -ENOENT);
+  EXPECT_EQ(chip_.i2c.fd, -1) << "whatever was there before";
   plain_i2c = false;
   EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -EOPNOTSUPP);
 }
 
 TEST_F(Mpu9250Test, ReportsAMissingAcknowledgeAtEveryStepOfOpening) {
   // who am I, two power writes, then write and read-back of seven registers
-  for (int step = 0; step < 3 + 14; step += 4) {
+  for (int step = 0; step < 3 + 14; step += step < 4 ? 1 : 3) {
     imu.failNext(EREMOTEIO, 1, step);
     EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -EREMOTEIO) << step;
     EXPECT_EQ(chip_.i2c.fd, -1);
@@ -188,8 +190,59 @@ TEST_F(Mpu9250Test, ReportsAMissingAcknowledgeAtEveryStepOfOpening) {
 }
 
 TEST_F(Mpu9250Test, ReportsARegisterThatDoesNotKeepItsValue) {
-  imu.keepRegister(0x1B);
-  EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -EIO);
+  for (const uint8_t reg : {uint8_t{0x19}, uint8_t{0x1B}, uint8_t{0x38}}) {
+    imu.keepRegister(reg);
+    EXPECT_EQ(mpu9250_open(&chip_, &kConfig), -EIO) << int{reg};
+    EXPECT_EQ(chip_.i2c.fd, -1);
+  }
+}
+
+// RM-MPU-9250A 4.4, 4.6, 4.7: SMPLRT_DIV, GYRO_FS_SEL and ACCEL_FS_SEL.
+TEST_F(Mpu9250Test, WritesTheCodesOfRatesAndRanges) {
+  for (uint8_t code = 0; code < 4; ++code) {
+    mpu9250_config_t config = kConfig;
+    config.rate_hz = static_cast<uint16_t>(1000 >> code);
+    config.gyro_range_dps = static_cast<uint16_t>(250 << code);
+    config.accel_range_g = static_cast<uint8_t>(2 << code);
+    config.dlpf = static_cast<uint8_t>(code + 1);
+    config.interrupt_active_low = false;
+    ASSERT_EQ(mpu9250_open(&chip_, &config), 0);
+    EXPECT_EQ(imu.reg(0x19), (1 << code) - 1);
+    EXPECT_EQ(imu.reg(0x1B), code << 3);
+    EXPECT_EQ(imu.reg(0x1C), code << 3);
+    EXPECT_EQ(imu.reg(0x1A), code + 1);
+    EXPECT_EQ(imu.reg(0x1D), code + 1);
+    EXPECT_EQ(imu.reg(0x37), 0x00) << "active high";
+    mpu9250_close(&chip_);
+  }
+}
+
+TEST_F(Mpu9250Test, IsNeverStuckWhenNobodyAsks) {
+  mpu9250_config_t config = kConfig;
+  config.stuck_after = 0;
+  ASSERT_EQ(mpu9250_open(&chip_, &config), 0);
+  mpu9250_sample_t sample;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_EQ(mpu9250_read(&chip_, &sample), 0);
+    EXPECT_EQ(sample.flags, 0u);
+  }
+}
+
+TEST_F(Mpu9250Test, EveryAxisIsWatchedForStandingStill) {
+  mpu9250_config_t config = kConfig;
+  config.stuck_after = 1;
+  ASSERT_EQ(mpu9250_open(&chip_, &config), 0);
+  mpu9250_sample_t sample;
+  ASSERT_EQ(mpu9250_read(&chip_, &sample), 0);
+  for (size_t axis = 0; axis < 6; ++axis) {
+    std::array<int16_t, 3> accel{}, gyro{};
+    (axis < 3 ? accel : gyro)[axis % 3] = static_cast<int16_t>(axis % 2 == 0 ? 256 : 1);  // either byte
+    imu.setSample(accel, gyro);
+    ASSERT_EQ(mpu9250_read(&chip_, &sample), 0);
+    EXPECT_EQ(sample.flags, 0u) << axis;
+    ASSERT_EQ(mpu9250_read(&chip_, &sample), 0);
+    EXPECT_EQ(sample.flags, MPU9250_STUCK) << axis;
+  }
 }
 
 TEST_F(Mpu9250Test, ReportsBusErrorsWhileReadingAndRecovers) {
@@ -206,8 +259,10 @@ TEST_F(Mpu9250Test, ReportsBusErrorsWhileReadingAndRecovers) {
 
 TEST_F(Mpu9250Test, ClosePutsTheChipToSleep) {
   ASSERT_EQ(mpu9250_open(&chip_, &kConfig), 0);
+  imu.setRegister(0x6A, 0xC0);  // a DMP that runs
   mpu9250_close(&chip_);
   EXPECT_EQ(imu.reg(0x38), 0);
+  EXPECT_EQ(imu.reg(0x6A), 0);
   EXPECT_EQ(imu.reg(0x6B), 0x40);
   mpu9250_close(&chip_);  // twice is once
 }

@@ -108,3 +108,76 @@ TEST_F(PwmTest, ReportsWhatTheKernelRefuses) {
   SyscallJournal::instance().failWrite("pwm0/duty_cycle", ENODEV);
   EXPECT_EQ(pwm_set_fraction(&pwm_, 0.1), -ENODEV);
 }
+
+TEST_F(PwmTest, ExportsAChannelThatIsNotThereAndUnexportsIt) {
+  const std::string dir = addPwm("48302200", 4);
+  removeAttribute(dir, "pwm1");
+  const auto answer = [&] {
+    for (const char* name : {"pwm1/period", "pwm1/duty_cycle", "pwm1/enable"}) setAttribute(dir, name, "0");
+  };
+  SyscallJournal::instance().onWrite("pwmchip4/export", answer);
+  ASSERT_EQ(pwm_open(&pwm_, "48302200", 1, kPeriod_ns), 0);
+  EXPECT_EQ(SyscallJournal::instance().lines(),
+            (std::vector<std::string>{"pwmchip4/export=1", "pwm1/period=50000", "pwm1/duty_cycle=0",
+                                      "pwm1/enable=1"}));
+  pwm_close(&pwm_);
+  EXPECT_EQ(SyscallJournal::instance().lines().back(), "pwmchip4/unexport=1");
+  EXPECT_EQ(attribute(dir, "pwm1/enable"), "0") << "first";
+}
+
+TEST_F(PwmTest, AChannelThatAnotherExportsMeanwhileIsNotUnexported) {
+  const std::string dir = addPwm("48302200", 4);
+  removeAttribute(dir, "pwm1");
+  SyscallJournal::instance().failWrite("pwmchip4/export", EBUSY);
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 1, kPeriod_ns), -ENOENT);
+  EXPECT_EQ(attribute(dir, "unexport"), "");
+}
+
+TEST_F(PwmTest, WaitsUntilUdevHasHandedTheAttributesOver) {
+  addPwm("48302200", 4);
+  SyscallJournal::instance().failOpen("pwm0/period", EACCES, 2);
+  SyscallJournal::instance().failOpen("pwm0/enable", EACCES, 1);
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 0, kPeriod_ns), 0);
+}
+
+TEST_F(PwmTest, ASiblingThatRestsMayHaveAnotherPeriod) {
+  const std::string dir = addPwm("48302200", 4);
+  setAttribute(dir, "pwm1/period", "40000");
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 0, kPeriod_ns), 0);
+  removeAttribute(dir, "pwm1/enable");
+  pwm_close(&pwm_);
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 0, kPeriod_ns), 0);
+}
+
+TEST_F(PwmTest, LeavesNoDescriptorOpenWhetherItOpensOrNot) {
+  const SyscallJournal& journal = SyscallJournal::instance();
+  addPwm("48302200", 4);
+  {
+    const NoStdin none;
+    ASSERT_EQ(pwm_open(&pwm_, "48302200", 0, kPeriod_ns), 0);
+    EXPECT_EQ(pwm_.duty_fd, 0) << "a descriptor like any other";
+    EXPECT_EQ(journal.openFiles(), 1) << "the on-time's, kept for the tick";
+    ASSERT_EQ(pwm_set_ns(&pwm_, kPeriod_ns), 0);
+    pwm_close(&pwm_);
+    EXPECT_EQ(journal.lines().back(), "pwm0/enable=0");
+    EXPECT_EQ(journal.lines()[journal.lines().size() - 2], "pwm0/duty_cycle=0");
+  }
+  EXPECT_EQ(pwm_.duty_fd, -1);
+  pwm_close(&pwm_);
+  SyscallJournal::instance().failWrite("pwm0/enable", EIO);
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 0, kPeriod_ns), -EIO);
+  EXPECT_EQ(pwm_.duty_fd, -1);
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 0, 0), -EINVAL);
+  EXPECT_EQ(pwm_.duty_fd, -1);
+  EXPECT_EQ(journal.openFiles(), 0);
+  EXPECT_EQ(journal.strayCloses(), 0);
+}
+
+TEST_F(PwmTest, RoundsFractionsToTheNearestNanosecond) {
+  const std::string dir = addPwm("48302200", 4);
+  ASSERT_EQ(pwm_open(&pwm_, "48302200", 0, 1000), 0);
+  ASSERT_EQ(pwm_set_fraction(&pwm_, 0.0016), 0);
+  EXPECT_EQ(attribute(dir, "pwm0/duty_cycle"), "2");
+  ASSERT_EQ(pwm_set_fraction(&pwm_, 0.0), 0);
+  EXPECT_EQ(attribute(dir, "pwm0/duty_cycle"), "0");
+}

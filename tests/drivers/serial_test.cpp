@@ -93,10 +93,62 @@ TEST_F(SerialTest, NothingThereIsNotTheEnd) {
 }
 
 TEST_F(SerialTest, ReportsBadRateMissingDeviceAndNoTerminal) {
+  serial_.fd = 77;
   EXPECT_EQ(serial_open(&serial_, path_.c_str(), 9601), -EINVAL);
+  EXPECT_EQ(serial_.fd, -1) << "whatever was there before";
   EXPECT_EQ(serial_open(&serial_, "/dev/nonexistent", 9600), -ENOENT);
   EXPECT_EQ(serial_open(&serial_, "/dev/null", 9600), -ENOTTY);
   EXPECT_EQ(serial_.fd, -1);
+}
+
+TEST_F(SerialTest, ForgetsWhatCameBeforeItWasOpened) {
+  const int early = open(path_.c_str(), O_RDWR | O_NOCTTY);
+  ASSERT_EQ(write(master_, "stale\n", 6), ssize_t{6});
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
+  uint8_t byte;
+  EXPECT_EQ(serial_read(&serial_, &byte, 1), -EAGAIN);
+  close(early);
+}
+
+TEST_F(SerialTest, NeedsNoCarrierAndReceives) {
+  const int before = open(path_.c_str(), O_RDWR | O_NOCTTY);
+  termios settings;
+  ASSERT_EQ(tcgetattr(before, &settings), 0);
+  settings.c_cflag &= ~static_cast<tcflag_t>(CLOCAL | CREAD);
+  settings.c_cflag |= CSTOPB | CRTSCTS | PARENB;
+  ASSERT_EQ(tcsetattr(before, TCSANOW, &settings), 0);
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
+  ASSERT_EQ(tcgetattr(serial_.fd, &settings), 0);
+  EXPECT_EQ(settings.c_cflag & (CLOCAL | CREAD), tcflag_t{CLOCAL | CREAD});
+  EXPECT_EQ(settings.c_cflag & (CSTOPB | CRTSCTS | PARENB), 0u);
+  close(before);
+}
+
+TEST_F(SerialTest, AReadOfNothingIsNoEnd) {
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
+  uint8_t byte;
+  EXPECT_EQ(serial_read(&serial_, &byte, 0), 0);
+}
+
+TEST_F(SerialTest, IsClosedOnceAndAlsoWhenItIsNoTerminal) {
+  SyscallJournal& journal = SyscallJournal::instance();
+  journal.clear();
+  EXPECT_EQ(serial_open(&serial_, "/dev/null", 9600), -ENOTTY);
+  EXPECT_EQ(serial_.fd, -1);
+  EXPECT_EQ(journal.openFiles(), 0);
+  ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
+  EXPECT_EQ(journal.openFiles(), 1);
+  EXPECT_EQ(journal.inheritable(), 0);
+  serial_close(&serial_);
+  serial_close(&serial_);
+  EXPECT_EQ(journal.openFiles(), 0);
+  EXPECT_EQ(journal.strayCloses(), 0);
+}
+
+TEST_F(SerialTest, PathsHaveABound) {
+  const std::string longest = "/" + std::string(254, 'x');  // 256 with the NUL
+  EXPECT_EQ(serial_open(&serial_, longest.c_str(), 9600), -ENOENT);
+  EXPECT_EQ(serial_open(&serial_, (longest + "x").c_str(), 9600), -ENAMETOOLONG);
 }
 
 using SerialByAddress = Testbed;

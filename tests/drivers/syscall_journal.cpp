@@ -16,28 +16,48 @@ SyscallJournal& SyscallJournal::instance() {
 void SyscallJournal::clear() {
   lines_.clear();
   failures_.clear();
+  answers_.clear();
   open_.clear();
   stray_closes_ = 0;
+  inheritable_ = 0;
 }
 
 void SyscallJournal::failRead(const std::string& path_end, int error, int times) {
-  failures_.push_back({false, path_end, error, times});
+  failures_.push_back({Call::kRead, path_end, error, times});
 }
 
 void SyscallJournal::failWrite(const std::string& path_end, int error, int times) {
-  failures_.push_back({true, path_end, error, times});
+  failures_.push_back({Call::kWrite, path_end, error, times});
 }
 
-bool SyscallJournal::takeFailure(bool write, const std::string& path, int* error) {
+void SyscallJournal::failOpen(const std::string& path_end, int error, int times) {
+  failures_.push_back({Call::kOpen, path_end, error, times});
+}
+
+void SyscallJournal::onWrite(const std::string& path_end, std::function<void()> answer) {
+  answers_.emplace_back(path_end, std::move(answer));
+}
+
+namespace {
+bool endsWith(const std::string& path, const std::string& end) {
+  return path.size() >= end.size() && path.compare(path.size() - end.size(), end.size(), end) == 0;
+}
+}  // namespace
+
+bool SyscallJournal::takeFailure(Call call, const std::string& path, int* error) {
   for (Failure& failure : failures_) {
-    const std::string& end = failure.path_end;
-    if (failure.write != write || failure.times == 0 || path.size() < end.size()) continue;
-    if (path.compare(path.size() - end.size(), end.size(), end) != 0) continue;
+    if (failure.call != call || failure.times == 0 || !endsWith(path, failure.path_end)) continue;
     --failure.times;
     *error = failure.error;
     return true;
   }
   return false;
+}
+
+void SyscallJournal::written(const std::string& path) const {
+  for (const auto& [path_end, answer] : answers_) {
+    if (endsWith(path, path_end)) answer();
+  }
 }
 
 namespace {
@@ -72,6 +92,7 @@ int __wrap_open64(const char* path, int flags, ...) {
   const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(rest, mode_t) : 0;
   va_end(rest);
   SyscallJournal& journal = SyscallJournal::instance();
+  if (journal.takeFailure(SyscallJournal::Call::kOpen, path, &errno)) return -1;
   const bool zero_is_free = kept_stdin >= 0 && !journal.isOpen(STDIN_FILENO);
   // umockdev knows its nodes in /dev by the descriptor that they were opened with; the others can be moved to
   // 0, which leaves no moment in which one of its threads could take 0.
@@ -87,6 +108,7 @@ int __wrap_open64(const char* path, int flags, ...) {
   }
   if (fd == STDIN_FILENO) zero_is_node = is_node;
   if (fd >= 0) journal.opened(fd);
+  if (fd >= 0 && (flags & O_CLOEXEC) == 0) journal.openedInheritable();
   errno = error;
   return fd;
 }
@@ -103,7 +125,7 @@ ssize_t __real_pwrite64(int fd, const void* data, size_t size, off64_t at);
 
 ssize_t __wrap_pread64(int fd, void* data, size_t size, off64_t at) {
   int error = 0;
-  if (!SyscallJournal::instance().takeFailure(false, pathOf(fd), &error))
+  if (!SyscallJournal::instance().takeFailure(SyscallJournal::Call::kRead, pathOf(fd), &error))
     return __real_pread64(fd, data, size, at);
   errno = error;
   return error == 0 ? 0 : -1;
@@ -112,12 +134,14 @@ ssize_t __wrap_pread64(int fd, void* data, size_t size, off64_t at) {
 ssize_t __wrap_pwrite64(int fd, const void* data, size_t size, off64_t at) {
   const std::string path = pathOf(fd);
   int error = 0;
-  if (SyscallJournal::instance().takeFailure(true, path, &error)) {
+  if (SyscallJournal::instance().takeFailure(SyscallJournal::Call::kWrite, path, &error)) {
     errno = error;
     return error == 0 ? 0 : -1;
   }
   SyscallJournal::instance().note(describe(path, data, size));
-  return __real_pwrite64(fd, data, size, at);
+  const ssize_t done = __real_pwrite64(fd, data, size, at);
+  SyscallJournal::instance().written(path);
+  return done;
 }
 }
 

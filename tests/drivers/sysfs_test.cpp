@@ -36,6 +36,79 @@ TEST_F(SysfsTest, MissingClassIsMissingDevice) {
   EXPECT_EQ(sysfs_find("/sys/bus/counter/devices", "counter", "48300180", dir), -ENODEV);
 }
 
+TEST_F(SysfsTest, LooksAtEntriesWithThePrefixOnly) {
+  addPwm("48304200", 0);
+  char dir[SYSFS_PATH_MAX];
+  EXPECT_EQ(sysfs_find("/sys/class/pwm", "pwmchip1", "48304200", dir), -ENODEV);
+  EXPECT_EQ(sysfs_find("/sys/class/pwm", "", "48304200", dir), 0);
+  EXPECT_STREQ(dir, "/sys/class/pwm/pwmchip0");
+}
+
+TEST_F(SysfsTest, AClassThatIsNoDirectoryIsAnError) {
+  char dir[SYSFS_PATH_MAX];
+  EXPECT_EQ(sysfs_find(writeFile("file", "").c_str(), "", "48300180", dir), -ENOTDIR);
+}
+
+TEST_F(SysfsTest, SearchesLeaveNoDescriptorOpen) {
+  addPwm("48304200", 0);
+  char dir[SYSFS_PATH_MAX];
+  int first = dup(0);
+  close(first);
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(sysfs_find("/sys/class/pwm", "pwmchip", "48304200", dir), 0);
+    EXPECT_EQ(sysfs_find("/sys/class/pwm", "pwmchip", "48302200", dir), -ENODEV);
+  }
+  const int after = dup(0);
+  EXPECT_EQ(after, first);
+  close(after);
+}
+
+TEST_F(SysfsTest, PathsHaveABound) {
+  char out[SYSFS_PATH_MAX];
+  const std::string dir(SYSFS_PATH_MAX - 3, 'd');  // with a slash, one letter and the NUL
+  EXPECT_EQ(sysfs_join(out, dir.c_str(), "x"), 0);
+  EXPECT_EQ(std::string(out), dir + "/x");
+  EXPECT_EQ(sysfs_join(out, dir.c_str(), "xy"), -ENAMETOOLONG);
+  int64_t number = 0;
+  char text[8];
+  EXPECT_EQ(sysfs_open(dir.c_str(), "xy", O_RDONLY), -ENAMETOOLONG);
+  EXPECT_EQ(sysfs_read_number(dir.c_str(), "xy", &number), -ENAMETOOLONG);
+  EXPECT_EQ(sysfs_read_text(dir.c_str(), "xy", text, sizeof text), -ENAMETOOLONG);
+  EXPECT_EQ(sysfs_write_number(dir.c_str(), "xy", 1), -ENAMETOOLONG);
+  EXPECT_EQ(sysfs_write_text(dir.c_str(), "xy", "1"), -ENAMETOOLONG);
+}
+
+TEST_F(SysfsTest, TextIsOneLineAndFitsItsPlace) {
+  const std::string path = writeFile("text", "quadrature x4\nmore\n");
+  const std::string dir = path.substr(0, path.rfind('/'));
+  char text[32];
+  EXPECT_EQ(sysfs_read_text(dir.c_str(), "text", text, sizeof text), 0);
+  EXPECT_STREQ(text, "quadrature x4");
+  char small[5] = {'.', '.', '.', '.', '.'};
+  EXPECT_EQ(sysfs_read_text(dir.c_str(), "text", small, 4), 0);
+  EXPECT_STREQ(small, "qua");
+  EXPECT_EQ(small[4], '.') << "nothing beyond";
+  SyscallJournal::instance().failRead("/text", EIO);
+  EXPECT_EQ(sysfs_read_text(dir.c_str(), "text", text, sizeof text), -EIO);
+  SyscallJournal::instance().failWrite("/text", EINVAL);
+  EXPECT_EQ(sysfs_write_text(dir.c_str(), "text", "increase"), -EINVAL);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+}
+
+TEST_F(SysfsTest, DescriptorZeroIsOneLikeAnyOther) {
+  const std::string path = writeFile("number", "7\n");
+  const std::string dir = path.substr(0, path.rfind('/'));
+  const NoStdin none;
+  int64_t number = 0;
+  EXPECT_EQ(sysfs_read_number(dir.c_str(), "number", &number), 0);
+  EXPECT_EQ(number, 7);
+  char text[8];
+  EXPECT_EQ(sysfs_read_text(dir.c_str(), "number", text, sizeof text), 0);
+  EXPECT_EQ(sysfs_write_text(dir.c_str(), "number", "8\n"), 0);
+  EXPECT_EQ(sysfs_write_number(dir.c_str(), "number", 9), 0);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+}
+
 class SysfsNumberTest : public Testbed {
  protected:
   int read(const std::string& text, int64_t* out) {
@@ -52,13 +125,20 @@ TEST_F(SysfsNumberTest, ReadsSignedNumbers) {
   EXPECT_EQ(value, 4294967295);
   ASSERT_EQ(read("-2147483648\n", &value), 0);
   EXPECT_EQ(value, -2147483648LL);
+  ASSERT_EQ(read("9223372036854775807\n", &value), 0);
+  EXPECT_EQ(value, INT64_MAX);
+  ASSERT_EQ(read("8", &value), 0);
+  EXPECT_EQ(value, 8);
+  ASSERT_EQ(read("9", &value), 0);
+  EXPECT_EQ(value, 9);
   ASSERT_EQ(read("0", &value), 0);
   EXPECT_EQ(value, 0);
 }
 
 TEST_F(SysfsNumberTest, RefusesWhatIsNoNumber) {
   int64_t value = 77;
-  for (const char* text : {"", "\n", "-", "abc", "12abc", "1 2", "9999999999999999999999"}) {
+  for (const char* text : {"", "\n", "-", "abc", "12abc", "1 2", "1/", "1:", "/1", ":1",
+                           "9223372036854775808", "9999999999999999999999"}) {
     EXPECT_EQ(read(text, &value), -EBADMSG) << text;
   }
   EXPECT_EQ(value, 77);

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/gpio.h>
 #include <linux/i2c-dev.h>
 #include <linux/i2c.h>
 #include <sys/stat.h>
@@ -36,9 +37,10 @@ Testbed::Testbed() : testbed_(umockdev_testbed_new()) {
 }
 
 Testbed::~Testbed() {
-  if (ioctl_ != nullptr) {
-    umockdev_testbed_detach_ioctl(testbed_, bus_node_.c_str(), nullptr);
-    g_object_unref(ioctl_);
+  EXPECT_EQ(SyscallJournal::instance().inheritable(), 0);
+  for (const auto& [node, ioctl] : ioctl_) {
+    umockdev_testbed_detach_ioctl(testbed_, node.c_str(), nullptr);
+    g_object_unref(ioctl);
   }
   g_object_unref(testbed_);
   fs::remove_all(scratch_);
@@ -104,16 +106,32 @@ std::string Testbed::addTty(const std::string& address, const std::string& name)
   return addDevice("@tty", address + ".serial/tty/" + name, {{"uevent", ""}});
 }
 
-void Testbed::addImu(int bus) {
-  const std::string name = "i2c-" + std::to_string(bus);
-  bus_node_ = "/dev/" + name;
-  const std::string device = "P: /devices/platform/" + name + "/i2c-dev/" + name + "\nN: " + name +
-                             "\nE: DEVNAME=" + bus_node_ + "\nE: SUBSYSTEM=i2c-dev\n";
+void Testbed::addNet(const std::string& address, const std::string& name) {
+  addDevice("@net", address + ".can/net/" + name, {});
+}
+
+void Testbed::addGpioChip(const std::string& address, int number) {
+  addDevice("gpio", address + ".gpio/gpiochip" + std::to_string(number), {});
+}
+
+void Testbed::addNode(const std::string& name, const std::string& subsystem, GCallback answer) {
+  const std::string node = "/dev/" + name;
+  const std::string device = "P: /devices/platform/" + name + "/" + subsystem + "/" + name + "\nN: " + name +
+                             "\nE: DEVNAME=" + node + "\nE: SUBSYSTEM=" + subsystem + "\n";
   GError* error = nullptr;
   ASSERT_TRUE(umockdev_testbed_add_from_string(testbed_, device.c_str(), &error)) << error->message;
-  ioctl_ = umockdev_ioctl_base_new();
-  g_signal_connect(ioctl_, "handle-ioctl", G_CALLBACK(&Testbed::onIoctl), this);
-  ASSERT_TRUE(umockdev_testbed_attach_ioctl(testbed_, bus_node_.c_str(), ioctl_, &error)) << error->message;
+  UMockdevIoctlBase* ioctl = ioctl_[node] = umockdev_ioctl_base_new();
+  g_signal_connect(ioctl, "handle-ioctl", answer, this);
+  ASSERT_TRUE(umockdev_testbed_attach_ioctl(testbed_, node.c_str(), ioctl, &error)) << error->message;
+}
+
+void Testbed::addGpioNode(const std::string& name, const std::string& label) {
+  gpio_label_ = label;
+  addNode(name, "gpio", G_CALLBACK(&Testbed::onLabelIoctl));
+}
+
+void Testbed::addImu(int bus) {
+  addNode("i2c-" + std::to_string(bus), "i2c-dev", G_CALLBACK(&Testbed::onIoctl));
 }
 
 void Testbed::addBoard() {
@@ -149,6 +167,18 @@ std::string Testbed::writeFile(const std::string& name, const std::string& conte
   const std::string path = scratch_ + "/" + name;
   std::ofstream(path, std::ios::binary) << content;
   return path;
+}
+
+gboolean Testbed::onLabelIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer user) {
+  UMockdevIoctlData* arg = umockdev_ioctl_client_get_arg(client);
+  gpiochip_info info{};
+  static_cast<Testbed*>(user)->gpio_label_.copy(info.label, sizeof info.label);
+  const bool known =
+      static_cast<uint32_t>(umockdev_ioctl_client_get_request(client)) == GPIO_GET_CHIPINFO_IOCTL;
+  const auto out = resolve(arg, 0, sizeof info);
+  if (known) umockdev_ioctl_data_update(out.get(), 0, reinterpret_cast<guint8*>(&info), sizeof info);
+  umockdev_ioctl_client_complete(client, known ? 0 : -1, known ? 0 : ENOTTY);
+  return TRUE;
 }
 
 gboolean Testbed::onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer user) {

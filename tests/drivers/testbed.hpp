@@ -22,6 +22,9 @@ class Testbed : public ::testing::Test {
   std::string addAdc(const std::string& name, int number);
   std::string addLed(const std::string& name);
   std::string addTty(const std::string& address, const std::string& name);  // no node in /dev
+  void addNet(const std::string& address, const std::string& name);         // an interface by its controller
+  void addGpioChip(const std::string& address, int number);                 // no node in /dev
+  void addGpioNode(const std::string& name, const std::string& label);  // a node alone, which tells its label
   void addImu(int bus = 2);
   void addBoard();  // all a robot with three motors needs
 
@@ -36,12 +39,14 @@ class Testbed : public ::testing::Test {
 
  private:
   static gboolean onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
+  static gboolean onLabelIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
+  void addNode(const std::string& name, const std::string& subsystem, GCallback answer);
   std::string addDevice(const std::string& subsystem, const std::string& path,
                         const std::map<std::string, std::string>& attributes);
   std::string hostPath(const std::string& path) const;
 
   UMockdevTestbed* testbed_;
-  UMockdevIoctlBase* ioctl_ = nullptr;
-  std::string bus_node_;
+  std::map<std::string, UMockdevIoctlBase*> ioctl_;  // by node
+  std::string gpio_label_;
   std::string scratch_;
 };

@@ -58,12 +58,29 @@ def test_a_tick_costs_no_more_than_committed(root, committed, robot):
     found = {
         "tick": profile["total"],
         "filter": count.per(machine.total, robot, "packed", count.STEPS),
+        "log": machine.log(robot),
         "simulated_tick": profile["run"],
     }
     grown = {k: (committed[robot][k], v) for k, v in found.items() if v > GROWTH * committed[robot][k]}
     assert grown == {}, "if it has to be: tools/count_instructions --write"
 
 
-def test_the_filter_costs_a_fifth_of_its_dense_form(committed):
-    for robot in count.ROBOTS:
-        assert committed[robot]["filter"] <= 0.2 * committed[robot]["dense_filter"]
+@pytest.fixture(scope="module", params=["x86", "cortex_a8"])
+def machine_counts(root, request):
+    return json.loads((root / count.TABLE).read_text(encoding="utf-8"))[request.param]
+
+
+@pytest.mark.parametrize("robot", count.ROBOTS)
+def test_a_tick_costs_a_quarter_of_one_with_the_dense_filter(machine_counts, robot):
+    counts = machine_counts[robot]
+    assert counts["tick"] <= 0.25 * counts["dense_tick"]
+    assert counts["filter"] <= 0.2 * counts["dense_filter"]
+
+
+def test_the_mbbrs_log_costs_a_quarter_of_a_tick(committed):
+    assert committed["mbbr"]["log"] <= 0.25 * committed["mbbr"]["tick"]
+
+
+def test_the_bridges_inversion_costs_two_fifths_of_newtons(machine_counts):
+    bridge = machine_counts["bridge"]
+    assert bridge["inversion"] <= 0.4 * bridge["newton"]

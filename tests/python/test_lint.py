@@ -1,5 +1,6 @@
 """The checks on our own tree, and proof that each of them bites."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -243,6 +244,23 @@ class TestClangTidy:
         tree = planted(project, src__a_cpp=bad.replace("int x;", "int x = 0;"))
         assert tidy.clang_tidy(tree) == []
         assert len(list((project / "build/host/tidy").iterdir())) == 1
+
+    def test_files_compiled_as_one_unit_are_looked_at_together_and_analyzed_alone(self, project):
+        tree = planted(
+            project,
+            src__a_cpp="int a(const int* p) {\n  if (p == nullptr) return *p;\n  return 0;\n}\n",
+            src__b_cpp="int b() {\n  int x;\n  return x;\n}\n",
+        )
+        unit = project / "build/host/Unity/unit.cxx"
+        unit.parent.mkdir()
+        unit.write_text(f'#include "{project}/src/a.cpp"\n#include "{project}/src/b.cpp"\n')
+        entry = {"directory": str(unit.parent), "file": str(unit), "command": f"c++ -o u.o -c {unit}"}
+        (project / "build/host/compile_commands.json").write_text(json.dumps([entry]))
+        findings = [(f.path, f.line, f.message) for f in tidy.clang_tidy(tree)]
+        assert any(p == "src/a.cpp" and n == 2 and "NullDereference" in m for p, n, m in findings)
+        assert any(p == "src/b.cpp" and n == 2 and "init-variables" in m for p, n, m in findings)
+        planted(project, src__a_cpp="int a() { return 1; }\n", src__b_cpp="int b() { return 2; }\n")
+        assert tidy.clang_tidy(tree) == []
 
     def test_it_looks_again_when_a_header_changed(self, project):
         tree = planted(project, src__a_cpp='#include "equipoise/a.hpp"\nint f() { return a(); }\n')

@@ -3,7 +3,7 @@
 import json
 import os
 
-from equipoise_tools.mutation.__main__ import Campaign, drawn, kept
+from equipoise_tools.mutation.__main__ import Campaign, drawn, kept, unseen
 from equipoise_tools.mutation.bench import Worker
 from equipoise_tools.mutation.generate import mutants
 from equipoise_tools.mutation.page import write_page
@@ -57,7 +57,7 @@ def project(root, folder):
 def outcomes(folder, work):
     (folder / work).mkdir()
     campaign = Campaign(folder, Store(folder / "results.jsonl"), 2, folder / work)
-    return campaign.go("own", OWN, 0, 1)
+    return campaign.go("own", OWN, drawn(OWN, "own", folder, 0, 1))
 
 
 def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, monkeypatch):
@@ -90,7 +90,16 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     del store.lines[list(store.lines)[-1]]
     assert len(kept(store, sample, "")) < len(told)
     page, _ = write_page({"own": []}, {}, None, 1, tmp_path)
-    assert f"| own | {len(told)} | 0 | | | not measured | 80 % | not measured |" in page
+    assert f"| own | {len(told)} | 0 |  |  | not measured | 80 % | not measured |" in page
+
+    # A sample for which tests were written is counted apart.
+    learnt, fresh = drawn(OWN, "own", tmp_path, 3, 1), unseen(OWN, "own", tmp_path, 3, 2, [1])
+    assert len(fresh) == 1 and not {m for *_, m in learnt} & {m for *_, m in fresh}
+    page, _ = write_page({"own": told[3:]}, {}, 3, 2, tmp_path, {("own", 1): told[:3]})
+    tried = [o.status for *_, o in told[:3] if o.status != "same_code"]
+    assert (
+        f" | {len(tried) - tried.count('survived')} of {len(tried)} |" in page and "holds | seed 1 |" in page
+    )
 
     # Nothing is built or run a second time; on better tests, what survived is.
     judged = []

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -249,91 +248,6 @@ TEST_F(GuardProcess, MotorsStayOffWhenAStoppedLoopWakesUpUntilItHasLetGo) {
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   page().want_enable.store(1);
   EXPECT_TRUE(wait_for(true));
-}
-
-/// What a descriptor is refused for; "": it is taken. The descriptor is closed.
-std::string complaint(int fd) {
-  try {
-    const runtime::SharedHeartbeat page(fd);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
-
-TEST(SharedHeartbeat, TakesOnlySealedAnonymousPagesOfOurs) {
-  const runtime::SharedHeartbeat own;
-  EXPECT_EQ(complaint(dup(own.fd())), "");
-  EXPECT_NE(complaint(-1), "");
-  EXPECT_NE(complaint(open("/tmp", O_TMPFILE | O_RDWR, 0600)).find("sealed"), std::string::npos);
-  const auto memory = [](off_t size, int seals) {
-    const int fd = memfd_create("page", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-    EXPECT_EQ(fchmod(fd, 0600), 0);
-    EXPECT_EQ(ftruncate(fd, size), 0);
-    EXPECT_EQ(fcntl(fd, F_ADD_SEALS, seals), 0);
-    return fd;
-  };
-  constexpr off_t kSize = sizeof(runtime::HeartbeatPage);
-  constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
-  EXPECT_NE(complaint(memory(kSize, F_SEAL_GROW | F_SEAL_SEAL)).find("sealed"), std::string::npos);
-  EXPECT_NE(complaint(memory(kSize - 1, kSeals)).find("size"), std::string::npos);
-  EXPECT_NE(complaint(memory(kSize, kSeals)).find("something else"), std::string::npos);
-  const int open_to_all = memory(kSize, kSeals);
-  EXPECT_EQ(fchmod(open_to_all, 0666), 0);
-  EXPECT_NE(complaint(open_to_all).find("another user"), std::string::npos);
-}
-
-TEST(SharedHeartbeat, AMachineWithoutRoomIsAnErrorText) {
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  ASSERT_NE(std::signal(SIGXFSZ, SIG_IGN), SIG_ERR);
-  rlimit none = before;
-  none.rlim_cur = 0;
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
-  std::string text;
-  try {
-    const runtime::SharedHeartbeat page;
-  } catch (const std::runtime_error& error) {
-    text = error.what();
-  }
-  EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-  std::signal(SIGXFSZ, SIG_DFL);
-  EXPECT_NE(text.find("no memory for it"), std::string::npos) << text;
-}
-
-TEST(SupervisorTest, ADeadGuardForbidsMotors) {
-  runtime::HeartbeatPage page{};
-  runtime::Supervisor supervisor({&page, 0, nullptr, false});
-  RawSample raw{};
-  std::int64_t now = 1'000'000'000;
-  const auto tick = [&](bool guard_lives) {
-    now += kTick_ns;
-    raw.t_ns = now;
-    if (guard_lives) page.guard.fetch_add(2);
-    const std::uint32_t reasons = supervisor.begin(now, raw);
-    supervisor.end(true, 0);
-    return reasons;
-  };
-  EXPECT_EQ(tick(false), kGuardDead);  // never seen
-  EXPECT_EQ(tick(true), 0U);
-  for (int i = 0; i < 100; ++i) EXPECT_EQ(tick(true), 0U);
-  int silent = 0;
-  while (tick(false) == 0 && silent < 100) ++silent;
-  EXPECT_LE(silent, 6);
-  EXPECT_EQ(tick(true), 0U);
-  page.cut.fetch_add(1);  // the guard found us too late
-  EXPECT_EQ(tick(true), kOverrun);
-  EXPECT_EQ(page.loop.load(), static_cast<std::uint32_t>(105 + silent));
-}
-
-TEST(SupervisorTest, AFailedWriteForbidsMotors) {
-  runtime::Supervisor supervisor({nullptr, kRealtimeMissing, nullptr, false});
-  RawSample raw{};
-  raw.t_ns = kTick_ns;
-  EXPECT_EQ(supervisor.begin(kTick_ns, raw), kRealtimeMissing);
-  supervisor.end(false, -EIO);
-  raw.t_ns = 2 * kTick_ns;
-  EXPECT_EQ(supervisor.begin(2 * kTick_ns, raw), kRealtimeMissing | kWriteFailed);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ import sympy as sp
 
 from . import emit
 from .model_header import Model
-from .packed import Covariance, heun_state
+from .packed import Covariance, Projected, heun_state
 from .straight import Emitter, pair, total
 
 DT = 0.005  # kTickS; the header asserts it
@@ -143,6 +143,9 @@ def render(filter: Filter) -> str:
         f"  static constexpr int kInputs = {p};",
         f"  static constexpr int kOutputs = {m};",
         f"  static constexpr int kTriangle = {Covariance.size(n)};  // of P, upper, rows from even columns",
+        "  // Pointers point there, to the middle: offsets of VFP's loads reach 1020 bytes, both ways.",
+        f"  static constexpr int kMiddleP = {Covariance.middle(n)};",
+        f"  static constexpr int kMiddlePh = {Projected.middle(n, m)};",
         f"  static constexpr double kTickS = {DT};",
         *_places("kB", "Entries of B: state, input", filter.B),
         *_places("kQ", "Entries of Q: row, column", filter.noise),
@@ -162,12 +165,14 @@ def render(filter: Filter) -> str:
         f"                    double x[{filter.motion}]) noexcept;",
         "  /// x, P after a tick with input u.",
         f"  static void predict(const Constants& k, const double u[{p}], double x[{n}],",
-        "                      double P[kTriangle]) noexcept;",
-        "  /// x, P after the samples y, of which those count whose flag is set.",
-        "  /// row_nis: squared innovation over its variance; 0 where not used, as row_innovation.",
+        "                      double* P) noexcept;",
+        "  /// x after the samples y, of which those count whose flag is set, and what P loses: the sum of",
+        f"  /// weight Ph Ph' over the rows. Ph[{n // 2}][{m}][2]: pairs of states, rows, state of the pair.",
+        "  /// row_nis: squared innovation over its variance; 0 where not used, like the other two.",
         f"  static void correct(const Constants& k, const double u[{p}], const double y[{m}],",
-        f"                      const bool use[{m}], double x[{n}], double P[kTriangle],",
-        f"                      double row_innovation[{m}], double row_nis[{m}]) noexcept;",
+        f"                      const bool use[{m}], double x[{n}], const double* P, double* Ph,",
+        f"                      double weight[{m}], double row_innovation[{m}],",
+        f"                      double row_nis[{m}]) noexcept;",
         "};",
         "",
     ]
@@ -191,13 +196,13 @@ def render_code(filter: Filter) -> str:
         "}",
         "",
         f"void {name}::predict(const Constants& k, const double u[{p}], double x[{n}],",
-        "    double P[kTriangle]) noexcept {",
+        "    double* P) noexcept {",
         *predict.late,
         "}",
         "",
         f"void {name}::correct(const Constants& k, const double u[{p}], const double y[{m}],",
-        f"    const bool use[{m}], double x[{n}], double P[kTriangle], double row_innovation[{m}],",
-        f"    double row_nis[{m}]) noexcept {{",
+        f"    const bool use[{m}], double x[{n}], const double* P, double* Ph, double weight[{m}],",
+        f"    double row_innovation[{m}], double row_nis[{m}]) noexcept {{",
         *correct.late,
         "}",
         "",
@@ -208,8 +213,6 @@ def render_code(filter: Filter) -> str:
         f"The model in robots/{filter.robot}/ekf.hpp is the readable form and the reference in tests.",
     ]
     includes = [
-        "#include <cmath>",
-        "",
         f'#include "generated/{filter.robot}_filter.hpp"',
     ]
     return _file(filter, "cpp", about, includes, body)

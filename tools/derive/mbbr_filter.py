@@ -49,6 +49,14 @@ def _derivative(em: Emitter, u):
     return of
 
 
+def small_turn(angle):
+    """Cosine and sine, as Turn::small() in types.hpp."""
+    a2 = angle * angle
+    cosine = 1.0 - a2 * (0.5 - a2 * (1.0 / 24.0 - a2 * (1.0 / 720.0)))
+    sine = angle * (1.0 - a2 * (1.0 / 6.0 - a2 * (1.0 / 120.0 - a2 * (1.0 / 5040.0))))
+    return cosine, sine
+
+
 def _felt(em: Emitter, x):
     return [em.variable(f"u[{i}]") + x[AT["ux"] + i] for i in range(3)]
 
@@ -70,11 +78,13 @@ def predict() -> Emitter:
         rows[state][AT["ux"] + i] = em.variable(f"k.B[{place}]", early=True)
     # A torque that stands in the room turns backwards in the yaw frame.
     keep, turn = em.variable("k.keep", early=True), DT * x[AT["dtz"]]
-    c, s = keep * em.call("std::cos", turn), keep * em.call("std::sin", turn)
+    cosine, sine = small_turn(turn)
+    c, s = keep * cosine, keep * sine
     ux, uy, uz = (AT[u] for u in ("ux", "uy", "uz"))
     felt = {ux: c * x[ux] + s * x[uy], uy: c * x[uy] - s * x[ux], uz: keep * x[uz]}
     P = Covariance(em, "P", N)
     P.transform({AT[name]: rows[AT[name]] for name in SUMS})
+    P.store()
     P.transform({i: rows[i] for i in MOVED})
     P.transform({ux: {ux: c, uy: s}, uy: {ux: -s, uy: c}, uz: {uz: keep}})
     add_noise(em, P, B)

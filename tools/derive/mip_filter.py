@@ -50,6 +50,7 @@ def predict() -> Emitter:
     felt = {AT[u]: keep * x[AT[u]] for u in ("ux", "uz")}
     P = Covariance(em, "P", N)
     P.transform({AT[s]: rows[AT[s]] for s in ("ph", "ps")})
+    P.store()
     P.transform({i: rows[i] for i in MOVED})
     P.transform({i: {i: keep} for i in felt})
     add_noise(em, P, B)

@@ -3,7 +3,7 @@ scalar updates. No matrix product is formed."""
 
 from __future__ import annotations
 
-from .straight import Emitter, Value, dot, inner, nonzero, pair, total
+from .straight import Emitter, Value, dot, inner, is_pair, nonzero, pair, total
 
 
 class Covariance:
@@ -14,30 +14,34 @@ class Covariance:
 
     def __init__(self, emitter: Emitter, array: str, n: int):
         self.emitter, self.n, self.array = emitter, n, array
-        self.value = {(i, j): emitter.variable(self.place(i, j)) for i in range(n) for j in range(i, n)}
+        self.version, self.changed = 0, {}
 
     def place(self, i: int, j: int) -> str:
         i, j = min(i, j), max(i, j)
         before = i * self.n - 2 * (i // 2) * ((i - 1) // 2)  # entries of the rows above
-        return f"{self.array}[{before + j - i // 2 * 2}]"
+        return f"{self.array}[{before + j - i // 2 * 2 - self.middle(self.n)}]"
 
     @staticmethod
     def size(n: int) -> int:
         return n * (n + 2) // 2
 
+    @staticmethod
+    def middle(n: int) -> int:
+        """The entry that the array's pointer points to: VFP's loads reach 1020 bytes, both ways."""
+        return Covariance.size(n) // 4 * 2
+
     def __getitem__(self, ij):
-        return self.value[min(ij), max(ij)]
+        ij = min(ij), max(ij)
+        return self.changed.get(ij) or self.emitter.load(self.place(*ij), self.version, pair=False)
 
     def __setitem__(self, ij, value):
-        self.value[min(ij), max(ij)] = value
+        self.changed[min(ij), max(ij)] = value
 
     def pair(self, k: int, q: int) -> Value:
         """Columns 2 q and 2 q + 1 of row k."""
-        a, b = self[k, 2 * q], self[k, 2 * q + 1]
-        in_memory = (a.key, b.key) == (("v", self.place(k, 2 * q)), ("v", self.place(k, 2 * q + 1)))
-        if in_memory and k <= 2 * q:
-            return self.emitter.load(self.place(k, 2 * q))
-        return pair(a, b)
+        if k <= 2 * q and not {(k, 2 * q), (k, 2 * q + 1)} & self.changed.keys():
+            return self.emitter.load(self.place(k, 2 * q), self.version)
+        return pair(self[k, 2 * q], self[k, 2 * q + 1])
 
     def transform(self, rows: dict[int, dict]) -> None:
         """P = T P T' with T the identity but for `rows` (sparse, diagonal entry included)."""
@@ -54,31 +58,18 @@ class Covariance:
                 elif i <= j:
                     self[i, j] = inner(rows[j], half[i].__getitem__)
 
-    def reduce(self, gains: list[list[Value]], vectors: list[list[Value]]) -> None:
-        """P -= the sum of gain vector'; gains by entry, vectors by pair."""
-        for i in range(self.n):
-            for q in range(i // 2, self.n // 2):
-                whole = 2 * q >= i
-                both = self.pair(i, q) if whole else self[i, 2 * q + 1]
-                for gain, vector in zip(gains, vectors, strict=True):
-                    both = both - gain[i] * (vector[q] if whole else vector[q][1])
-                if whole:
-                    self[i, 2 * q], self[i, 2 * q + 1] = both[0], both[1]
-                else:
-                    self[i, 2 * q + 1] = both
-
     def store(self) -> None:
-        """Neighbours that are a pair in one go."""
-        for i in range(self.n):
-            j = i
-            while j < self.n:
-                both = self.pair(i, j // 2) if j % 2 == 0 and j + 1 < self.n else None
-                if both is not None and both.pair and self[i, j].key == both[0].key:
-                    self.emitter.store(self.place(i, j), both)
-                    j += 1
-                else:
-                    self.emitter.store(self.place(i, j), self[i, j])
-                j += 1
+        """What changed; neighbours that are a pair in one go. From then on it is loaded again."""
+        places = sorted(self.changed)
+        while places:
+            i, j = places.pop(0)
+            value = self.changed[i, j]
+            if j % 2 == 0 and places[:1] == [(i, j + 1)] and is_pair(value, self.changed[i, j + 1]):
+                value = pair(value, self.changed[places.pop(0)])
+            self.emitter.store(self.place(i, j), value)
+        self.changed.clear()
+        self.emitter.settle()
+        self.version += 1
 
 
 def heun(x: list[Value], derivative, dt: float):
@@ -149,13 +140,45 @@ def _sum(*summands: tuple[Value, dict]) -> dict:
     return {i: by_pairs([(c, A[i]) for c, A in summands if i in A]) for i in sorted(rows)}
 
 
-def correct(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[Value], sums: dict) -> None:
-    """All measurements, one after the other; P loses what all of them take in one go.
+class Projected:
+    """P h of every row, in memory by pairs of states: what a row's updates leave is loaded again for the
+    next, so that little has to lie on the stack."""
 
-    `sums`: sums of states, by name, that several rows use. Stores x, P, every row's innovation and its
-    square over its variance. A row whose flag is clear has no gain.
+    def __init__(self, emitter: Emitter, array: str, n: int, m: int):
+        self.emitter, self.array, self.n, self.m = emitter, array, n, m
+        self.version = 0
+
+    def place(self, q: int, i: int) -> str:
+        """States 2 q and 2 q + 1 of row i."""
+        return f"{self.array}[{2 * (q * self.m + i) - self.middle(self.n, self.m)}]"
+
+    @staticmethod
+    def middle(n: int, m: int) -> int:
+        return n * m // 4 * 2
+
+    def __getitem__(self, qi: tuple[int, int]) -> Value:
+        return self.emitter.load(self.place(*qi), self.version)
+
+    def __setitem__(self, qi: tuple[int, int], value: Value):
+        self.emitter.store(self.place(*qi), value)
+
+    def settle(self) -> None:
+        self.emitter.settle()
+        self.version += 1
+
+    def entry(self, i: int):
+        """Of row i, by state."""
+        return lambda k: self[k // 2, i][k % 2]
+
+
+def correct(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[Value], sums: dict) -> None:
+    """All measurements, one after the other; what P loses to them, the caller takes off: weight Ph Ph'.
+
+    `sums`: sums of states, by name, that several rows use. Stores x, Ph, and of every row weight, innovation
+    and its square over its variance. A row whose flag is clear has no weight.
     """
-    n, one = P.n, emitter.constant(1.0)
+    n, m, one = P.n, len(rows), emitter.constant(1.0)
+    Ph = Projected(emitter, "Ph", n, m)
 
     def measured(row, vector):
         return dot(row, lambda s: dot(sums.get(s, {s: one}), vector))
@@ -165,37 +188,41 @@ def correct(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[V
         for s, c in row.items():
             for k, v in sums.get(s, {s: one}).items():
                 flat[k] = flat[k] + c * v if k in flat else c * v
-        return inner(flat, vector.__getitem__)
+        return inner(flat, vector)
 
-    Ph = [[] for _ in rows]
     for q in range(n // 2):
         columns = {}
         for i, row in enumerate(rows):
-            Ph[i].append(measured(row, lambda k, q=q, known=columns: known.setdefault(k, P.pair(k, q))))
-    correction = [emitter.constant(0.0)] * (n // 2)
-    gains, weights, innovations, squared = [], [], [], []
+            Ph[q, i] = measured(row, lambda k, q=q, known=columns: known.setdefault(k, P.pair(k, q)))
+    weights, innovations, squared = [], [], []
     for i, row in enumerate(rows):
-        entries = [[p[lane] for p in before for lane in (0, 1)] for before in Ph[: i + 1]]
-        covariances = [covered(row, e) for e in entries]  # with the rows before it, and its own
+        Ph.settle()
+        # With the rows before it, and its own.
+        covariances = [covered(row, Ph.entry(j)) for j in range(i + 1)]
         shares = [c * w for c, w in zip(covariances, weights, strict=False)]
         variance = covariances[i] + emitter.variable(f"k.R[{i}]", early=True)
         innovation = residuals[i]
-        for share, c, before, seen in zip(shares, covariances, Ph, innovations, strict=False):
+        for share, c, seen in zip(shares, covariances, innovations, strict=False):
             variance = variance - share * c
             innovation = innovation - share * seen
-            Ph[i] = [p - share * b for p, b in zip(Ph[i], before, strict=True)]
+        for q in range(n // 2) if shares else ():
+            both = Ph[q, i]
+            for j, share in enumerate(shares):
+                both = both - share * Ph[q, j]
+            Ph[q, i] = both
         weight = emitter.select(f"use[{i}]", variance.inverse())
         innovation = emitter.select(f"use[{i}]", innovation)
-        gain = [p * weight for p in Ph[i]]
-        gains.append([g[lane] for g in gain for lane in (0, 1)])
-        correction = [c + g * innovation for c, g in zip(correction, gain, strict=True)]
         weights.append(weight)
         innovations.append(innovation)
         squared.append(innovation * innovation * weight)
-    P.reduce(gains, Ph)
+    Ph.settle()
+    steps = [w * v for w, v in zip(weights, innovations, strict=True)]
     for q in range(n // 2):
-        emitter.store(f"x[{2 * q}]", emitter.load(f"x[{2 * q}]") + correction[q])
-    P.store()
-    for i in range(len(rows)):
+        both = emitter.load(f"x[{2 * q}]", Ph.version)
+        for i, step in enumerate(steps):
+            both = both + step * Ph[q, i]
+        emitter.store(f"x[{2 * q}]", both)
+    for i in range(m):
+        emitter.store(f"weight[{i}]", weights[i])
         emitter.store(f"row_innovation[{i}]", innovations[i])
         emitter.store(f"row_nis[{i}]", squared[i])

@@ -44,9 +44,13 @@ class Emitter:
     def constant(self, number: float) -> Value:
         return Value(self, ("c", float(number)), early=True)
 
-    def load(self, first: str) -> Value:
-        """Two neighbours in memory."""
-        return self.name(("load", first), f"load(&{first})", pair=True)
+    def load(self, first: str, version: int = 0, pair: bool = True) -> Value:
+        """Two neighbours in memory, or one; `version` grows with every settle() after which they are loaded
+        again."""
+        return self.name(("load", first, version, pair), f"load(&{first})" if pair else first, pair=pair)
+
+    def settle(self) -> None:
+        self.statements.append("settle();")
 
     def name(self, key, text: str, early: bool = False, pair: bool = False) -> Value:
         """The value of `text`, computed once."""
@@ -70,9 +74,6 @@ class Emitter:
         if body not in self.kept:
             self.kept[body] = f"{self.constants}{'_pairs' if value.pair else ''}[{len(self.kept)}]"
         return self.kept[body]
-
-    def call(self, function: str, value: Value) -> Value:
-        return self.name((function, value.key), f"{function}({self.use(value)})")
 
     def select(self, flag: str, value: Value) -> Value:
         return self.name(("?", flag, value.key), f"{flag} ? {self.use(value)} : 0.0")
@@ -153,6 +154,9 @@ class Value:
 
     def _named(self, sign: str, other: Value) -> Value:
         a, b = self, other
+        if a.pair is not b.pair:  # GCC would fill both lanes anew for every product
+            early = a.early and b.early
+            a, b = (v if v.pair or v.number is not None else twice(v, early) for v in (a, b))
         early, pair = a.early and b.early, a.pair or b.pair
         if sign != "-" and (a.pair, str(a.key)) > (b.pair, str(b.key)):
             a, b = b, a
@@ -256,6 +260,14 @@ def pair(a: Value, b: Value) -> Value:
     early = a.early and b.early and (a.number is None or b.number is None)
     both = f"{{{e.use(a, early)}, {e.use(b, early)}}}"
     return e.name(("pair", a.key, b.key), both, early, pair=True)
+
+
+def twice(a: Value, early: bool) -> Value:
+    """In both lanes."""
+    if a.is_negated:
+        return -twice(-a, early)
+    text = a.emitter.use(a, early)
+    return a.emitter.name(("pair", a.key, a.key, early), f"{{{text}, {text}}}", early, pair=True)
 
 
 def nonzero(row: dict) -> dict:

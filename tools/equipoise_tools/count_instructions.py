@@ -22,6 +22,7 @@ ROBOTS = {"mbbr": "config/mbbr.toml", "mip": "config/edumip.toml"}
 TICKS = (600, 1000)  # after arming, while the isolation's bank no longer runs
 STEPS = (200, 600)
 INVERSIONS = (6400, 19200)
+LOGGED_S = (2, 5)
 TICK_HZ = 200
 CLOCK_HZ = 1e9
 TABLE = Path("tests/data/instructions.json")
@@ -47,11 +48,25 @@ class Callgrind:
 
     def profile(self, robot: str, part: str, times: int) -> dict[str, int]:
         """Instructions in all, and of the tick by stage."""
+        return self._profile([str(self.program), robot, ROBOTS[robot], part, str(times)])
+
+    def _profile(self, command: list[str]) -> dict[str, int]:
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "callgrind"
-            command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", str(self.program)]
-            _run([*command, robot, ROBOTS[robot], part, str(times)], self.root)
+            _run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", *command], self.root)
             return by_stage(out.read_text(encoding="utf-8", errors="replace"))
+
+    def log(self, robot: str) -> float:
+        """Of the thread that writes the log, per tick: what a simulation with one costs more."""
+        program = str(self.root / "build/host/equipoise")
+        command = [program, "sim", "--config", ROBOTS[robot], "--telemetry", "off", "--duration-s"]
+        with tempfile.TemporaryDirectory() as folder:
+            few, many = (
+                self._profile([*command, str(s), "--log", f"{folder}/{s}.lcm"])["total"]
+                - self._profile([*command, str(s), "--log", "off"])["total"]
+                for s in LOGGED_S
+            )
+        return (many - few) / ((LOGGED_S[1] - LOGGED_S[0]) * TICK_HZ)
 
     def total(self, robot: str, part: str, times: int) -> int:
         return self.profile(robot, part, times)["total"]
@@ -166,10 +181,10 @@ def counted(machine) -> dict:
         stages = None
         if isinstance(machine, Callgrind):
             stages = tick_profile(machine, robot)
-            tick, run = stages.pop("total"), stages.pop("run")
+            tick, run, log = stages.pop("total"), stages.pop("run"), machine.log(robot)
         else:
             run = per(machine.total, robot, "run", TICKS)
-            tick = per(machine.total, robot, "ticks", TICKS) - run
+            tick, log = per(machine.total, robot, "ticks", TICKS) - run, None
         packed, dense = (per(machine.total, robot, form, STEPS) for form in ("packed", "dense"))
         numbers = {
             "tick": tick,
@@ -180,6 +195,7 @@ def counted(machine) -> dict:
         }
         result[robot] = {k: round(v) for k, v in numbers.items()}
         result[robot]["ratio"] = round(tick / (tick - packed + dense), 4)
+        result[robot]["log"] = log and round(log)
         result[robot]["stages"] = stages and {k: round(v) for k, v in stages.items()}
         if isinstance(machine, CortexA8):
             run_cycles = per(machine.cycles, robot, "run", TICKS)
@@ -214,10 +230,12 @@ def table(counts: dict) -> list[str]:
         ("the same filter, dense Eigen", "dense_filter"),
         ("tick with the dense filter", "dense_tick"),
         ("tick over that", "ratio"),
+        ("log of a tick, another thread", "log"),
         ("simulated tick: plant, sensors, tick", "simulated_tick"),
     ]
     for label, key in rows:
-        lines.append(f"| {label} | " + " | ".join(f"{c[key]:,}" for _, c in columns) + " |")
+        cells = ["" if c[key] is None else f"{c[key]:,}" for _, c in columns]
+        lines.append(f"| {label} | " + " | ".join(cells) + " |")
     for stage in [*STAGES, "rest"]:
         cells = [f"{c['stages'][stage]:,}" if c["stages"] else "" for _, c in columns]
         lines.append(f"| stage: {stage} | " + " | ".join(cells) + " |")

@@ -41,8 +41,6 @@ class DriveCoastInverse {
   DriveCoastSolution solve(double omega_r, double i_over_is) const noexcept;
 
  private:
-  bool discontinuous(double v, double b, double d) const noexcept;
-
   double T_r_;
   double full_decay_;  // 1 - exp(-T_r)
 };

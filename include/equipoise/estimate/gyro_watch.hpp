@@ -121,6 +121,8 @@ class GyroWatch {
     settling_ = std::max(settling_ - 1, 0);
     latest_ = latest_ > 0 ? latest_ - 1 : kKept - 1;
     gyro_[latest_] = gyro_[latest_ + kKept] = z.gyro_B_rad_s;
+    gyro_sum_[latest_] = gyro_sum_[latest_ + kKept] =
+        gyro_[latest_] + gyro_[latest_ + 1] + gyro_[latest_ + 2];
     angle_[latest_] = angle_[latest_ + kKept] = z.wheel_angle_rad;
     samples_ = std::min(samples_ + 1, static_cast<int>(kKept));
     const bool calm = accel_nis_ < kPushed && settling_ == 0;
@@ -146,6 +148,7 @@ class GyroWatch {
   static constexpr std::size_t kHalf = 3;  // ticks: what happened in the last three against the three before
   // Swapped axes look like an encoder that counts wrongly within so few ticks; twice as many tell them apart.
   static constexpr std::size_t kSlowHalf = 6;
+  static_assert(kHalf == 3 && kSlowHalf % kHalf == 0);  // sums of three
   static constexpr std::size_t span(std::size_t half) noexcept { return 2 * half + 1; }
   static constexpr std::size_t kKept = span(kSlowHalf);
   static constexpr double kSurprise = 60.0;        // squared, in sigmas
@@ -264,13 +267,13 @@ class GyroWatch {
   };
 
   Seen seen(std::size_t half, const GyroWitness<Wheels>& witness) const noexcept {
-    const Vec3* const gyro = &gyro_[latest_];
+    const Vec3* const gyro = &gyro_sum_[latest_];
     const Vec<Wheels>* const angle = &angle_[latest_];
     const double share = 1.0 / static_cast<double>(half);
     const double half_s = static_cast<double>(half) * kTickS;
     Seen s;
     Vec3 before = Vec3::Zero();
-    for (std::size_t i = 0; i < half; ++i) {
+    for (std::size_t i = 0; i < half; i += kHalf) {
       s.mean += gyro[i];
       before += gyro[half + i];
     }
@@ -359,6 +362,7 @@ class GyroWatch {
   GyroWatchParams<Wheels> p_;
   // The latest kKept samples from `latest_` on, latest first; each is written twice, so that none is moved.
   std::array<Vec3, 2 * kKept> gyro_{};
+  std::array<Vec3, 2 * kKept> gyro_sum_{};  // of kHalf from there on
   std::array<Vec<Wheels>, 2 * kKept> angle_{};
   std::size_t latest_ = 0;
   std::array<bool, 3> examined_{true, true, true};  // axes

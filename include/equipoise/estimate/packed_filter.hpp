@@ -7,6 +7,7 @@
 
 #include <array>
 
+#include "equipoise/estimate/downdate.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/types.hpp"
 
@@ -53,11 +54,16 @@ class PackedFilter {
     Steps::ahead(constants_, u.data(), dt, x.data());
   }
 
-  void predict(const Vec<p>& u) noexcept { Steps::predict(constants_, u.data(), x_.data(), P_.data()); }
+  void predict(const Vec<p>& u) noexcept {
+    Steps::predict(constants_, u.data(), x_.data(), P_.data() + Steps::kMiddleP);
+  }
 
   void update(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
-    Steps::correct(constants_, u.data(), y.data(), use.data(), x_.data(), P_.data(), row_innovation_.data(),
-                   row_nis_.data());
+    alignas(16) double Ph[n * m];
+    double weight[m];
+    Steps::correct(constants_, u.data(), y.data(), use.data(), x_.data(), P_.data() + Steps::kMiddleP,
+                   Ph + Steps::kMiddlePh, weight, row_innovation_.data(), row_nis_.data());
+    downdate<n, m>(weight, Ph, P_.data());
     double nis = 0.0;
     int used = 0;
     for (std::size_t i = 0; i < m; ++i) {

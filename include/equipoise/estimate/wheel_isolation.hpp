@@ -16,6 +16,10 @@
 
 namespace equipoise {
 
+/// 1 + what a filter has learnt of the wheels' radii, as far as robots as built differ; a lying encoder takes
+/// the filter further.
+inline double believable_scale(double learnt) noexcept { return 1.0 + std::clamp(learnt, -0.05, 0.05); }
+
 template <class Filter, int Wheels>
 class WheelIsolation {
  public:

@@ -20,6 +20,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "equipoise/runtime/big_endian.hpp"
 #include "equipoise/runtime/fields.hpp"
 
 namespace equipoise::runtime {
@@ -50,9 +51,13 @@ template <class T>
 using Unsigned = std::conditional_t<sizeof(T) == 8, std::uint64_t,
                                     std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint8_t>>;
 
+/// Writes from the beginning of `out`, which has the message's size once the encoder is gone.
 class Encoder {
  public:
-  explicit Encoder(Bytes* out) : out_(*out) {}
+  explicit Encoder(Bytes* out) : out_(*out) { out_.resize(kUsual); }
+  ~Encoder() { out_.resize(used_); }
+  Encoder(const Encoder&) = delete;
+  Encoder& operator=(const Encoder&) = delete;
 
   template <class T>
   void operator()(const char*, const char*, const T& value) {
@@ -63,19 +68,30 @@ class Encoder {
     if constexpr (kIsScalar<T>) {
       Unsigned<T> bits{};
       std::memcpy(&bits, &value, sizeof value);
-      for (std::size_t i = sizeof bits; i-- > 0;) out_.push_back(static_cast<std::uint8_t>(bits >> (8U * i)));
+      store_big_endian(bits, room(sizeof bits));
     } else if constexpr (std::is_same_v<T, std::string>) {
       const std::size_t end = std::min(value.find('\0'), value.size());  // LCM's strings hold no zero
       put(static_cast<std::int32_t>(end + 1));
-      out_.insert(out_.end(), value.begin(), value.begin() + static_cast<std::ptrdiff_t>(end));
-      out_.push_back(0);
+      std::uint8_t* const text = room(end + 1);
+      std::memcpy(text, value.data(), end);
+      text[end] = 0;
     } else {
       for (const auto& element : value) put(element);
     }
   }
 
  private:
+  static constexpr std::size_t kUsual = 256;  // bytes; most messages of a tick are shorter
+
+  std::uint8_t* room(std::size_t size) {
+    const std::size_t at = used_;
+    used_ += size;
+    if (used_ > out_.size()) out_.resize(2 * used_);
+    return out_.data() + at;
+  }
+
   Bytes& out_;
+  std::size_t used_ = 0;
 };
 
 class Decoder {
@@ -131,7 +147,6 @@ class Decoder {
 
 template <class Message, class Record>
 void encode(Message message, const Record& record, std::int64_t utime, std::int64_t tick, Bytes* out) {
-  out->clear();
   wire::Encoder encoder(out);
   encoder.put(fingerprint(message));
   encoder.put(utime);

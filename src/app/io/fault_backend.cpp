@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace equipoise::app {
@@ -93,7 +94,7 @@ void FaultBackend::spoil_imu(rio_sensors_t* s) {
       for (double& a : s->accel_counts) a += gaussian(0.5 * 4096.0);
       break;
     case FaultKind::kNotANumber:
-      s->gyro_counts[1] = NAN;
+      s->gyro_counts[1] = std::numeric_limits<double>::quiet_NaN();
       break;
     case FaultKind::kBiasJump:
       for (double& g : s->gyro_counts) g += 0.2 * kCountsPerRad_s;

@@ -4,20 +4,25 @@
 
 namespace equipoise {
 
-MbbrMotion::MbbrMotion(const Vec2& theta_xy, const Vec3& omega, const Vec2& phi_dot) noexcept
-    : omega_B(omega),
-      phi_dot_star(phi_dot),
-      theta_xy_(theta_xy),
-      sx_(std::sin(theta_xy.x())),
-      cx_(std::cos(theta_xy.x())),
-      sy_(std::sin(theta_xy.y())),
-      cy_(std::cos(theta_xy.y())) {
-  R_ << cy_, sy_ * sx_, sy_ * cx_, 0.0, cx_, -sx_, -sy_, cy_ * sx_, cy_ * cx_;
+MbbrMotion::MbbrMotion(const Vec2& theta_xy, const Turn& x, const Turn& y, const Vec3& omega,
+                       const Vec2& phi_dot) noexcept
+    : omega_B(omega), phi_dot_star(phi_dot), theta_xy_(theta_xy), x_(x), y_(y) {
+  R_.row(0) << cy(), sy() * sx(), sy() * cx();
+  R_.row(1) << 0.0, cx(), -sx();
+  R_.row(2) << -sy(), cy() * sx(), cy() * cx();
 }
 
+MbbrMotion::MbbrMotion(const Vec2& theta_xy, const Vec3& omega, const Vec2& phi_dot) noexcept
+    : MbbrMotion(theta_xy, Turn(theta_xy.x()), Turn(theta_xy.y()), omega, phi_dot) {}
+
+MbbrMotion::MbbrMotion(const MbbrMotion& before, const Vec2& theta_xy, const Vec3& omega,
+                       const Vec2& phi_dot) noexcept
+    : MbbrMotion(theta_xy, before.x_.near(theta_xy.x(), theta_xy.x() - before.theta_xy_.x()),
+                 before.y_.near(theta_xy.y(), theta_xy.y() - before.theta_xy_.y()), omega, phi_dot) {}
+
 Vec3 MbbrMotion::theta_dot() const noexcept {
-  const double z = (sx_ * omega_B.y() + cx_ * omega_B.z()) / cy_;
-  return {omega_B.x() + sy_ * z, cx_ * omega_B.y() - sx_ * omega_B.z(), z};
+  const double z = (sx() * omega_B.y() + cx() * omega_B.z()) / cy();
+  return {omega_B.x() + sy() * z, cx() * omega_B.y() - sx() * omega_B.z(), z};
 }
 
 MbbrDynamics::MbbrDynamics(const MbbrParameters& p) noexcept
@@ -82,21 +87,12 @@ MbbrAccelerations MbbrDynamics::response(const MbbrMotion& m, const MbbrMass& ma
   return solve(mass, -tau_B, m.R().topRows<2>() * tau_B);
 }
 
-Vec3 MbbrDynamics::encoder_rate_B(const MbbrMotion& m) noexcept {
-  return m.R().transpose() * Vec3(m.phi_dot_star.x(), m.phi_dot_star.y(), m.spin_rad_s) - m.omega_B;
-}
-
 Vec3 MbbrDynamics::accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a,
                                    const Vec3& arm_B) const noexcept {
   const Vec2 ball = ball_velocity(p_.r, a.phi_ddot_inertial);
   const Vec3 gravity_minus_ball(-ball.x(), -ball.y(), -kGravity_m_s2);
   return m.R().transpose() * gravity_minus_ball - a.omega_dot_B.cross(arm_B) -
          m.omega_B.cross(m.omega_B.cross(arm_B));
-}
-
-Vec2 MbbrDynamics::phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept {
-  const double yaw_rate = m.theta_dot().z();
-  return a.phi_ddot_inertial + yaw_rate * Vec2(m.phi_dot_star.y(), -m.phi_dot_star.x());
 }
 
 Vec3 MbbrDynamics::theta_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept {

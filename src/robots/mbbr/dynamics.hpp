@@ -13,12 +13,14 @@ class MbbrMotion {
  public:
   MbbrMotion() = default;
   MbbrMotion(const Vec2& theta_xy, const Vec3& omega, const Vec2& phi_dot) noexcept;
+  /// Within a step of an integrator: the sines follow from those of `before`.
+  MbbrMotion(const MbbrMotion& before, const Vec2& theta_xy, const Vec3& omega, const Vec2& phi_dot) noexcept;
 
   const Vec2& theta_xy() const noexcept { return theta_xy_; }
-  double sx() const noexcept { return sx_; }
-  double cx() const noexcept { return cx_; }
-  double sy() const noexcept { return sy_; }
-  double cy() const noexcept { return cy_; }
+  double sx() const noexcept { return x_.sine(); }
+  double cx() const noexcept { return x_.cosine(); }
+  double sy() const noexcept { return y_.sine(); }
+  double cy() const noexcept { return y_.cosine(); }
   /// Of the tilt alone, yaw frame <- body: Ry(theta_y) Rx(theta_x). Rows: the yaw frame's axes in body
   /// components.
   const Mat3& R() const noexcept { return R_; }
@@ -30,8 +32,11 @@ class MbbrMotion {
   double spin_rad_s = 0.0;           // ball about the vertical; only where it slips on the floor
 
  private:
+  MbbrMotion(const Vec2& theta_xy, const Turn& x, const Turn& y, const Vec3& omega,
+             const Vec2& phi_dot) noexcept;
+
   Vec2 theta_xy_ = Vec2::Zero();
-  double sx_ = 0.0, cx_ = 1.0, sy_ = 0.0, cy_ = 1.0;
+  Turn x_{0.0}, y_{0.0};  // of the tilt
   Mat3 R_ = Mat3::Identity();
 };
 
@@ -70,7 +75,10 @@ class MbbrDynamics {
   MbbrAccelerations response(const MbbrMotion& m, const MbbrMass& mass, const Vec3& tau_B) const noexcept;
 
   /// Ball rate relative to the body, body axes: what the encoders see. [T] (5.10)
-  static Vec3 encoder_rate_B(const MbbrMotion& m) noexcept;
+  static Vec3 encoder_rate_B(const MbbrMotion& m) noexcept {
+    return m.R().transpose().lazyProduct(Vec3(m.phi_dot_star.x(), m.phi_dot_star.y(), m.spin_rad_s)) -
+           m.omega_B;
+  }
 
   /// Gravity minus acceleration at the IMU, body axes: the negative of an accelerometer's reading. [T] (5.26)
   Vec3 accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
@@ -79,8 +87,13 @@ class MbbrDynamics {
   /// The same at another place of the body.
   Vec3 accelerometer_B(const MbbrMotion& m, const MbbrAccelerations& a, const Vec3& arm_B) const noexcept;
 
-  /// d(phi*')/dt: the inertial acceleration plus the transport term of the turning frame.
-  static Vec2 phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept;
+  /// d(phi*')/dt: the inertial acceleration plus the transport term of the frame that turns at `yaw_rate`.
+  static Vec2 phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a, double yaw_rate_rad_s) noexcept {
+    return a.phi_ddot_inertial + yaw_rate_rad_s * Vec2(m.phi_dot_star.y(), -m.phi_dot_star.x());
+  }
+  static Vec2 phi_star_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept {
+    return phi_star_ddot(m, a, m.theta_dot().z());
+  }
 
   /// Second derivatives of the Euler angles.
   static Vec3 theta_ddot(const MbbrMotion& m, const MbbrAccelerations& a) noexcept;

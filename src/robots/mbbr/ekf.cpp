@@ -38,9 +38,9 @@ void MbbrEkfModel::predict(const Vec<18>& x, const Vec3& u, Vec<18>& x_next, Mat
   F_observable.middleRows<3>(kE) *= scale;
   F_observable.block<3, 3>(kE, kE).setIdentity();
   // A torque that stands in the room turns backwards in the yaw frame.
-  const double turn = kTickS * x(kThetaDotZ);
-  const double c = keep_ * std::cos(turn);
-  const double s = keep_ * std::sin(turn);
+  const Turn turn = Turn::small(kTickS * x(kThetaDotZ));
+  const double c = keep_ * turn.cosine();
+  const double s = keep_ * turn.sine();
   const Vec3 d = x.segment<3>(kDisturbance);
   x_next = x;
   x_next.head<10>() = next;
@@ -135,6 +135,7 @@ void MbbrEkf::start(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Vec3&
   time_.reset(wheel_angle_rad);
   gyro_bias_z_ = gyro_bias_B_rad_s.z();
   heading_ = 0.0;
+  direction_ = Turn(0.0);
   phi_.setZero();
 }
 
@@ -150,8 +151,10 @@ void MbbrEkf::predict(const Vec3& u) noexcept {
     filter_.widen(Model::kPhiDotX, 2, params_.push_ball_rate_variance);
   }
   const double turn = 0.5 * kTickS * (rate_before + x()(Model::kThetaDotZ));
-  phi_ += kTickS * rotate(heading_ + 0.5 * turn, Vec2(0.5 * (before + x().segment<2>(Model::kPhiDotX))));
+  const Vec2 mean = 0.5 * (before + x().segment<2>(Model::kPhiDotX));
+  phi_ += kTickS * (direction_ * Turn::small(0.5 * turn))(mean);
   heading_ += turn;
+  direction_ = Turn(heading_);
 }
 
 void MbbrEkf::update(const Mbbr::Sample& z) noexcept {
@@ -184,13 +187,14 @@ MbbrEstimate MbbrEkf::estimate() const noexcept {
     const Observable::State then = s;
     filter_.ahead(u + disturbance, dt, s);
     const double turn = 0.5 * dt * (then(Model::kThetaDotZ) + s(Model::kThetaDotZ));
-    now.phi += dt * rotate(now.theta_z + 0.5 * turn, Vec2(0.5 * (then.tail<2>() + s.tail<2>())));
+    const Turn middle = direction_ * Turn::small(now.theta_z - heading_ + 0.5 * turn);
+    now.phi += dt * middle(Vec2(0.5 * (then.tail<2>() + s.tail<2>())));
     now.theta_z += turn;
   });
   now.theta_xy = s.head<2>();
   now.theta_dot = s.segment<3>(Model::kThetaDotX);
   now.phi_dot_star = s.tail<2>();
-  now.omega_B = body_rates(now.theta_xy, now.theta_dot);
+  now.omega_B = MbbrHighYaw::body_rates(now.theta_xy, now.theta_dot);
   now.normalized_innovation = filter_.normalized_innovation();
   return now;
 }

@@ -101,6 +101,7 @@ class MbbrEkf {
   TimeBase<3, 3> time_;
   double gyro_bias_z_ = 0.0;
   double heading_ = 0.0;
+  Turn direction_{0.0};  // of it
   Vec2 phi_ = Vec2::Zero();
 };
 

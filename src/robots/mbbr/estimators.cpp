@@ -118,8 +118,9 @@ void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   Mbbr::Sample believed = z;
   gyro_watch_.screen(believed, x.omega_B);
   const double spin_rad_s = Mbbr::vertical_spin_rad_s(x);
+  const double scale = believable_scale(ekf_.x()(MbbrEkfModel::kWheelScale));
   isolation_.step(ekf_, u, believed, [&](const Vec3& wheel_rates) {
-    return Mbbr::slip_rad_s(wheel_rates, believed.gyro_B_rad_s.z(), kinematics_, spin_rad_s);
+    return Mbbr::slip_rad_s(wheel_rates / scale, believed.gyro_B_rad_s.z(), kinematics_, spin_rad_s);
   });
   // What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
   const double turns_rad_s = x.omega_B.z();

@@ -57,17 +57,15 @@ Mat<5, 3> MbbrHighYaw::rate_input_matrix(const MbbrCoefficients& c) noexcept {
 void MbbrHighYaw::inertial_rows(const MbbrCoefficients& c, const State& x, const Vec3& u, Vec<5>& y,
                                 Mat<5, 7>& J) noexcept {
   J.setZero();
-  y(0) = x(kThetaDotX) - x(kThetaY) * x(kThetaDotZ);
+  // theta_z'' has theta_x theta_y'', and theta_y'' is not small: without its integral in the yaw gyro's row
+  // the filter would read tilt out of it, and the ball speed error grows fivefold.
+  y.head<3>() = body_rates(x.head<2>(), x.segment<3>(kThetaDotX));
   J(0, kThetaDotX) = 1.0;
   J(0, kThetaY) = -x(kThetaDotZ);
   J(0, kThetaDotZ) = -x(kThetaY);
-  y(1) = x(kThetaDotY) + x(kThetaX) * x(kThetaDotZ);
   J(1, kThetaDotY) = 1.0;
   J(1, kThetaX) = x(kThetaDotZ);
   J(1, kThetaDotZ) = x(kThetaX);
-  // theta_z'' has theta_x theta_y'', and theta_y'' is not small: without its integral here the filter would
-  // read tilt out of the yaw gyro, and the ball speed error grows fivefold.
-  y(2) = x(kThetaDotZ) - x(kThetaX) * x(kThetaDotY);
   J(2, kThetaDotZ) = 1.0;
   J(2, kThetaX) = -x(kThetaDotY);
   J(2, kThetaDotY) = -x(kThetaX);

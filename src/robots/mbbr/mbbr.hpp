@@ -98,10 +98,9 @@ struct Mbbr {
   using Estimate = MbbrEstimate;
   using Sample = Measurement<kWheels>;
 
-  /// (R^T omega)_z of a ball that does not spin about the vertical.
+  /// (R^T omega)_z of a ball that does not spin about the vertical, for small tilts.
   static double vertical_spin_rad_s(const MbbrEstimate& x) noexcept {
-    return x.phi_dot_star.x() * std::sin(x.theta_xy.y()) * std::cos(x.theta_xy.x()) -
-           x.phi_dot_star.y() * std::sin(x.theta_xy.x());
+    return x.phi_dot_star.x() * x.theta_xy.y() - x.phi_dot_star.y() * x.theta_xy.x();
   }
 
   /// The ball does not spin about the vertical: (R^T omega)_z - Omega_z must be what the encoders say.

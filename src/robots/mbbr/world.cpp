@@ -51,17 +51,23 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       here_(at(s_)),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)) {}
 
-MbbrMotion MbbrWorld::motion(const State& s) noexcept {
-  MbbrMotion m(s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot));
-  m.spin_rad_s = s(kSpin);
-  return m;
+MbbrWorld::Instant MbbrWorld::moving(const State& s, const MbbrMotion& m, const Turn& heading) noexcept {
+  Instant now;
+  now.motion = m;
+  now.motion.spin_rad_s = s(kSpin);
+  now.heading = heading;
+  now.relative_B = MbbrDynamics::encoder_rate_B(now.motion);
+  return now;
 }
 
 MbbrWorld::Instant MbbrWorld::at(const State& s) noexcept {
-  Instant now;
-  now.motion = motion(s);
-  now.heading = Turn(s(kTheta + 2));
-  return now;
+  const MbbrMotion m(s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot));
+  return moving(s, m, Turn(s(kTheta + 2)));
+}
+
+MbbrWorld::Instant MbbrWorld::near(const State& s) const noexcept {
+  const MbbrMotion m(here_.motion, s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot));
+  return moving(s, m, here_.heading.near(s(kTheta + 2), s(kTheta + 2) - s_(kTheta + 2)));
 }
 
 void MbbrWorld::arrive(const State& s) noexcept {
@@ -89,27 +95,21 @@ Vec2 MbbrWorld::pull_star(const Instant& now) const noexcept {
   return pull;
 }
 
-MbbrWorld::Instant MbbrWorld::forces(const Instant& at, const Vec2& push_W,
-                                     const Vec3& friction_B) const noexcept {
-  Instant now = at;
-  const Vec3 relative = MbbrDynamics::encoder_rate_B(now.motion);
+void MbbrWorld::forces(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept {
   const double viscous = world_.common.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
-  now.viscous_B = -viscous * relative;
-  now.wheel_torque = drive_.wheel_torques(motors_, relative);
-  now.loads.tau_B = drive_.torque_B(now.wheel_torque, now.viscous_B + friction_B);
+  now->viscous_B = -viscous * now->relative_B;
+  now->wheel_torque = drive_.wheel_torques(motors_, now->relative_B);
+  now->loads.tau_B = drive_.torque_B(now->wheel_torque, now->viscous_B + friction_B);
   if (!push_W.isZero(0.0)) {
-    now.loads.push_B = now.motion.R().topRows<2>().transpose() * now.heading.back(push_W);
+    now->loads.push_B = now->motion.R().topRows<2>().transpose() * now->heading.back(push_W);
   }
-  now.loads.pull_star = pull_star(now);
-  return now;
+  now->loads.pull_star = pull_star(*now);
 }
 
-MbbrWorld::Instant MbbrWorld::rolling(const Instant& at, const Vec2& push_W,
-                                      const Vec3& friction_B) const noexcept {
-  Instant now = forces(at, push_W, friction_B);
-  now.mass = dynamics_.mass(now.motion);
-  now.a = dynamics_.accelerations(now.motion, now.mass, now.loads);
-  return now;
+void MbbrWorld::rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept {
+  forces(now, push_W, friction_B);
+  now->mass = dynamics_.mass(now->motion);
+  now->a = dynamics_.accelerations(now->motion, now->mass, now->loads);
 }
 
 /// The same instant with friction: forces and mass matrix are known, the accelerations linear in the torque.
@@ -126,11 +126,12 @@ MbbrWorld::Instant MbbrWorld::with_friction(const Instant& free, const Vec3& fri
 MbbrWorld::State MbbrWorld::derivative(const Instant& now) const noexcept {
   const MbbrMotion& m = now.motion;
   State d;
-  d.segment<3>(kTheta) = m.theta_dot();
+  const Vec3 theta_dot = m.theta_dot();
+  d.segment<3>(kTheta) = theta_dot;
   d.segment<3>(kOmega) = now.a.omega_dot_B;
-  d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, now.a);
+  d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, now.a, theta_dot.z());
   d.segment<2>(kPhi) = now.heading(m.phi_dot_star);
-  d.segment<3>(kRelative) = drive_.seen_rate_B(MbbrDynamics::encoder_rate_B(m));
+  d.segment<3>(kRelative) = drive_.seen_rate_B(now.relative_B);
   d.segment<3>(kSlip).setZero();
   return d;
 }
@@ -147,15 +148,15 @@ MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const Instant& now,
   d.segment<3>(kOmega) = a.omega_dot_B;
   d.segment<2>(kPhiDot) = a.ball_dot.head<2>() + turning(m.phi_dot_star);
   d.segment<2>(kPhi) = now.heading(m.phi_dot_star + Vec2(-slip.y(), slip.x()) / robot_.r);
-  d.segment<3>(kRelative) = drive_.seen_rate_B(MbbrDynamics::encoder_rate_B(m));
+  d.segment<3>(kRelative) = drive_.seen_rate_B(now.relative_B);
   d.segment<2>(kSlip) = slip_dot + turning(slip);
   d(kSpin) = a.ball_dot.z();
   return d;
 }
 
-Vec3 MbbrWorld::friction_limit_B(const MbbrMotion& m) const noexcept {
+Vec3 MbbrWorld::friction_limit_B(const Instant& now) const noexcept {
   if (!world_.common.friction) return Vec3::Zero();
-  return friction_limit_N_m(world_, robot_.mu_c, MbbrDynamics::encoder_rate_B(m));
+  return friction_limit_N_m(world_, robot_.mu_c, now.relative_B);
 }
 
 /// Per axis, the constant torque that would end this step at rest, limited to friction's: sticking and
@@ -164,8 +165,7 @@ Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Instant& free) const noex
   if (!world_.common.friction) return Vec3::Zero();
   const double h = world_.common.step_s;
   const State next = s + h * derivative(free);
-  return uncoupled_coulomb_torque<3>(MbbrDynamics::encoder_rate_B(motion(next)), mobility_, h,
-                                     friction_limit_B(free.motion));
+  return uncoupled_coulomb_torque<3>(near(next).relative_B, mobility_, h, friction_limit_B(free));
 }
 
 /// The same where the floor may give way: all axes, the slip and the spin together.
@@ -174,9 +174,9 @@ MbbrFriction MbbrWorld::slip_friction(const State& s, const Instant& free, doubl
   const MbbrSlipAccelerations a = floor_.accelerations(free.motion, mass, free.loads, {});
   const State next = s + h * slip_derivative(s, free, a);
   Vec<6> rates;
-  rates << MbbrDynamics::encoder_rate_B(motion(next)), next.segment<3>(kSlip);
+  rates << near(next).relative_B, next.segment<3>(kSlip);
   const double normal = floor_.needed(free.motion, free.loads, felt_as_rolling(a, robot_.r)).normal_N;
-  return floor_.friction(free.motion, mass, rates, h, friction_limit_B(free.motion), normal);
+  return floor_.friction(free.motion, mass, rates, h, friction_limit_B(free), normal);
 }
 
 Felt MbbrWorld::felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
@@ -215,10 +215,10 @@ void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const Mb
 }
 
 void MbbrWorld::step(double h) noexcept {
-  drive_.begin_step(motors_, MbbrDynamics::encoder_rate_B(here_.motion),
-                    kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
+  drive_.begin_step(motors_, here_.relative_B, kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
   const Vec2 push = push_now();
-  const Instant free = rolling(here_, push, Vec3::Zero());
+  Instant free = here_;
+  rolling(&free, push, Vec3::Zero());
   if (!slipping_) {
     friction_.axes_B = coulomb_torque_B(s_, free);
     const Instant now = with_friction(free, friction_.axes_B);
@@ -226,15 +226,18 @@ void MbbrWorld::step(double h) noexcept {
     if (!slipping_) {
       if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
       load_wheels(now, friction_.axes_B, now.a, h);
-      arrive(rk4_step(s_, derivative(now), h,
-                      [&](const State& s) { return derivative(rolling(at(s), push, friction_.axes_B)); }));
+      arrive(rk4_step(s_, derivative(now), h, [&](const State& s) {
+        Instant then = near(s);
+        rolling(&then, push, friction_.axes_B);
+        return derivative(then);
+      }));
       time_s_ += h;
       return;
     }
   }
   friction_ = slip_friction(s_, free, h);
-  const auto sliding = [&](const Instant& at) {
-    const Instant now = forces(at, push, friction_.axes_B);
+  const auto sliding = [&](Instant now) {
+    forces(&now, push, friction_.axes_B);
     return floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
   };
   const MbbrSlipAccelerations a = sliding(here_);
@@ -242,7 +245,7 @@ void MbbrWorld::step(double h) noexcept {
   if (sensors_.aged()) sensors_.feel(felt(free.motion, felt_a));
   load_wheels(free, friction_.axes_B, felt_a, h);
   State next = rk4_step(s_, slip_derivative(s_, free, a), h, [&](const State& s) {
-    const Instant now = at(s);
+    const Instant now = near(s);
     return slip_derivative(s, now, sliding(now));
   });
   if (friction_.floor_holds) {
@@ -274,17 +277,19 @@ void MbbrWorld::advance(const MotorCommand& command) {
   } else {
     disturb();
   }
-  motors_.update_battery(kinematics_.wheels_from_ball(MbbrDynamics::encoder_rate_B(here_.motion)));
+  motors_.update_battery(kinematics_.wheels_from_ball(here_.relative_B));
 }
 
 Felt MbbrWorld::felt_now() const noexcept {
   if (slipping_) {
-    const Instant now = forces(here_, push_now(), friction_.axes_B);
+    Instant now = here_;
+    forces(&now, push_now(), friction_.axes_B);
     const MbbrSlipAccelerations a =
         floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
     return felt(now.motion, felt_as_rolling(a, robot_.r));
   }
-  Instant now = rolling(here_, push_now(), Vec3::Zero());
+  Instant now = here_;
+  rolling(&now, push_now(), Vec3::Zero());
   if (!held_) now = with_friction(now, coulomb_torque_B(s_, now));
   return felt(now.motion, now.a);
 }

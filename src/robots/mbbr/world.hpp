@@ -54,21 +54,23 @@ class MbbrWorld {
   struct Instant {
     MbbrMotion motion;
     Turn heading{0.0};
+    Vec3 relative_B;  // rate of the ball against the body
     Vec3 wheel_torque;
     Vec3 viscous_B;
     MbbrLoads loads;
     MbbrMass mass;
     MbbrAccelerations a;
   };
-  static MbbrMotion motion(const State& s) noexcept;
-  static Instant at(const State& s) noexcept;  // motion alone
-  /// Of an instant whose motion is known.
-  Instant forces(const Instant& at, const Vec2& push_W, const Vec3& friction_B) const noexcept;
-  Instant rolling(const Instant& at, const Vec2& push_W, const Vec3& friction_B) const noexcept;
+  static Instant moving(const State& s, const MbbrMotion& m, const Turn& heading) noexcept;
+  static Instant at(const State& s) noexcept;   // motion alone
+  Instant near(const State& s) const noexcept;  // the same within a step from here
+  /// Of an instant whose motion is known: forces, and accelerations of a ball that rolls.
+  void forces(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
+  void rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
   Instant with_friction(const Instant& free, const Vec3& friction_B) const noexcept;
   State derivative(const Instant& now) const noexcept;
   State slip_derivative(const State& s, const Instant& now, const MbbrSlipAccelerations& a) const noexcept;
-  Vec3 friction_limit_B(const MbbrMotion& m) const noexcept;
+  Vec3 friction_limit_B(const Instant& now) const noexcept;
   Vec3 coulomb_torque_B(const State& s, const Instant& free) const noexcept;
   MbbrFriction slip_friction(const State& s, const Instant& free, double h) const noexcept;
   Vec2 pull_star(const Instant& now) const noexcept;

@@ -142,6 +142,70 @@ TEST(DriveCoast, UnreachableTargetsClampAndSaySo) {
   EXPECT_EQ(drive_coast_invert(0.289, 0.5, 0.0).u, 0.0);
 }
 
+/// Where the start is good one step is left to do, and it leaves rounding only.
+TEST(DriveCoast, OneStepSolvesAFastBridgeToRounding) {
+  for (const double T_r : {0.05, 0.289}) {
+    const DriveCoastInverse inverse(T_r);
+    int solved = 0;
+    for (double w = -0.94; w < 0.945; w += 0.02) {
+      for (double r = 0.01; r < 0.35; r += 0.01) {
+        const double target = 0.25 * r * r * (1.0 - w * w) / T_r;
+        const DriveCoastSolution solution = inverse.solve(w, target);
+        if (solution.iterations == 0) continue;  // continuous there
+        ++solved;
+        ASSERT_EQ(solution.iterations, 1) << w << " " << r;
+        ASSERT_NEAR(drive_coast_mean_current(T_r, w, solution.u) / target, 1.0, 1e-11) << w << " " << r;
+      }
+    }
+    EXPECT_GT(solved, 100);
+  }
+}
+
+TEST(DriveCoast, TheSmallestTargetsFollowTheSquareRoot) {
+  // u = b r/T_r with r^2 = g T_r/(b d) for r -> 0, b = (1 + w)/2, d = (1 - w)/2
+  const double b = 0.3;
+  for (const double T_r : {0.289, 10.0}) {
+    for (const double r : {2e-21, 9e-21, 1.1e-20, 1e-12}) {
+      const double g = r * r * b * (1.0 - b) / T_r;
+      EXPECT_NEAR(drive_coast_invert(T_r, 2.0 * b - 1.0, g).u / (b * r / T_r), 1.0, 1e-11) << r;
+    }
+  }
+}
+
+TEST(MotorParameters, OfTheMiniMbbAreTheDissertations) {
+  const MotorParameters motor;
+  EXPECT_NEAR(motor.T_r(), 0.289, 5e-4);  // [T] section 6.2.3
+  EXPECT_NEAR(motor.stall_current_A(8.0), 8.0 / 3.385, 1e-12);
+  EXPECT_NEAR(motor.no_load_rad_s(8.0), 8.0 / 0.0742, 1e-9);
+  EXPECT_NEAR(motor.k1(), 0.0742 * 8.0 / 3.385, 1e-12);  // (5.12)
+  EXPECT_NEAR(motor.k2(), 0.0742 * 0.0742 / 3.385, 1e-12);
+}
+
+TEST(Bridge, BelievesABatteryBetweenHalfAndOneAndAHalfOfNominal) {
+  const Bridge bridge{MotorParameters()};
+  for (const double volts : {4.01, 11.99}) EXPECT_EQ(bridge.supply_V(volts, true), volts);
+  for (const double volts : {4.0, 12.0, -7.4}) EXPECT_EQ(bridge.supply_V(volts, true), 8.0) << volts;
+}
+
+TEST(Bridge, WithoutInversionIsALinearBridgesDutyWithinFull) {
+  MotorParameters motor;
+  motor.invert_bridge = false;
+  for (const BridgeType type : {BridgeType::kDriveCoast, BridgeType::kDriveBrake}) {
+    motor.bridge = type;
+    const Bridge bridge(motor);
+    EXPECT_DOUBLE_EQ(bridge.invert(0.25, 30.0, 4.0), 0.5);
+    EXPECT_EQ(bridge.invert(0.9, 0.0, 4.0), 1.0);
+    EXPECT_EQ(bridge.invert(-0.9, 0.0, 4.0), -1.0);
+  }
+}
+
+TEST(Bridge, WhatIsNotFiniteReachesTheGate) {
+  const Bridge bridge{MotorParameters()};
+  EXPECT_FALSE(std::isfinite(bridge.invert(std::nan(""), 0.0, 8.0)));
+  EXPECT_FALSE(std::isfinite(bridge.invert(0.1, std::numeric_limits<double>::infinity(), 8.0)));
+  EXPECT_TRUE(std::isfinite(bridge.invert(0.1, 1e6, 8.0))) << "a wheel may turn faster than without load";
+}
+
 TEST(Bridge, ScalesWithTheBatteryAndIgnoresImplausibleReadings) {
   MotorParameters motor;
   motor.bridge = BridgeType::kDriveBrake;

@@ -1,5 +1,6 @@
 // The guard's loop in a thread, bridges that count, a stand-in for the loop it watches. Counted in polls of
 // the guard, not in time: a slow machine makes it slower, not wrong.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -186,6 +187,17 @@ TEST_F(GuardLoop, AFirstOrLastSleepThatFailsIsReported) {
   bridges_.off_error = 0;
   EXPECT_EQ(finish().error, -EIO);
 
+  CountingBridges first_well;
+  std::atomic<bool> stop{false};
+  runtime::HeartbeatPage quiet{};
+  app::GuardEnd end;
+  std::thread guard([&] { end = app::guard_loop(options_, first_well, quiet, stop); });
+  while (quiet.guard.load() < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  first_well.off_error = -ENODEV;
+  stop = true;
+  guard.join();
+  EXPECT_EQ(end.error, -ENODEV) << "the last one alone";
+
   CountingBridges others;
   others.off_error = -ENXIO;
   const std::atomic<bool> at_once{true};
@@ -276,6 +288,31 @@ TEST(FileBridges, WritesOneNumberToEach) {
   EXPECT_EQ(no_enable.off(), -ENOSPC);
   EXPECT_THROW(app::FileBridges("", {dir / "none"}), std::runtime_error);
   std::filesystem::remove_all(dir);
+}
+
+TEST(FileBridges, CloseWhatTheyHaveOpenedAlsoDescriptorZero) {
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("bridge-zero-" + std::to_string(getpid()));
+  std::ofstream(path) << "7\n";
+  const int kept = dup(STDIN_FILENO);
+  close(STDIN_FILENO);
+  {
+    app::FileBridges bridges(path, {path});
+    EXPECT_EQ(fcntl(STDIN_FILENO, F_GETFD) & FD_CLOEXEC, FD_CLOEXEC) << "the first that is free";
+    EXPECT_EQ(bridges.enable(), 0);
+    std::string text;
+    std::ifstream(path) >> text;
+    EXPECT_EQ(text, "1");
+  }
+  EXPECT_EQ(fcntl(STDIN_FILENO, F_GETFD), -1);
+  const int next = dup(kept);
+  EXPECT_EQ(next, STDIN_FILENO);
+  const int after = dup(kept);
+  close(kept);
+  EXPECT_EQ(dup(next), kept) << "nothing else was left open";
+  close(kept);
+  close(after);
+  std::filesystem::remove(path);
 }
 
 TEST(BeatWatch, LivesFromItsFirstBeatForAsLongAsTheLimit) {

@@ -148,6 +148,82 @@ TEST_F(Gate, AnEdgeIsObeyedOncePerTurn) {
   EXPECT_EQ(wish().heading_resets, 1);
 }
 
+TEST_F(Gate, CountsWhatItObeysEachInItsPlace) {
+  take({1, kArm, 990, 0});
+  EXPECT_EQ(wish().arms, 1);
+  EXPECT_EQ(wish().disarms, 0);
+  EXPECT_EQ(wish().turn, 1);
+  EXPECT_EQ(wish().heard_ms, 990);
+  EXPECT_EQ(wish().yaw_rate_rad_s, 0.0) << "motion comes with DRIVE alone";
+  take({2, kDrive, 995, 1});
+  EXPECT_EQ(wish().turn, 1);
+  EXPECT_EQ(wish().heard_ms, 995);
+  take({3, signed_command_t::HEADING_RESET, 1000, 1});
+  EXPECT_EQ(wish().heading_resets, 1);
+  EXPECT_EQ(wish().arms, 1);
+  EXPECT_TRUE(wish().arm);
+  EXPECT_EQ(wish().velocity_W_m_s[0], 0.0);
+  EXPECT_EQ(wish().yaw_rate_rad_s, 0.0);
+  take({4, kDisarm, 1000, 2});
+  EXPECT_EQ(wish().disarms, 1);
+  EXPECT_EQ(wish().arms, 1);
+  EXPECT_EQ(wish().turn, 3);
+}
+
+TEST_F(Gate, BothVelocitiesCountAndBothStopWithTheTurn) {
+  signed_command_t m = command_for(gate_, keys_, {1, kDrive});
+  m.velocity_W_m_s[1] = -0.5;
+  sign(keys_, "mbbr", &m);
+  ASSERT_EQ(gate_.accept(m, 1000), Verdict::kObeyed);
+  EXPECT_EQ(wish().velocity_W_m_s[1], -0.5);
+  m = command_for(gate_, keys_, {2, kDisarm});
+  m.velocity_W_m_s[1] = -0.5;
+  sign(keys_, "mbbr", &m);
+  ASSERT_EQ(gate_.accept(m, 1000), Verdict::kObeyed);
+  EXPECT_EQ(wish().velocity_W_m_s[1], 0.0);
+}
+
+TEST_F(Gate, TheFirstInstantOfItsClockCounts) { EXPECT_EQ(take({1, kDrive, 0}, 0), Verdict::kObeyed); }
+
+TEST_F(Gate, EveryNumberOfACommandMustBeOne) {
+  const double bad = std::numeric_limits<double>::infinity();
+  const auto refused = [&](auto&& change) {
+    signed_command_t m = command_for(gate_, keys_, {1, kDrive});
+    change(m);
+    sign(keys_, "mbbr", &m);
+    return gate_.accept(m, 1000) == Verdict::kRefused;
+  };
+  EXPECT_TRUE(refused([&](auto& m) { m.velocity_W_m_s[0] = bad; }));
+  EXPECT_TRUE(refused([&](auto& m) { m.velocity_W_m_s[1] = -bad; }));
+  EXPECT_TRUE(refused([&](auto& m) { m.yaw_rate_rad_s = bad; }));
+}
+
+TEST_F(Gate, ItsRobotMayHaveAnotherNameThanTheKeys) {
+  CommandGate named(keys_, kTimeout_ms, "second");
+  EXPECT_EQ(name_in(named.announcement(0, 0).robot), "second");
+  EXPECT_EQ(named.accept(command_for(named, keys_, {1, kDrive}), 1000), Verdict::kRefused);
+  EXPECT_EQ(named.accept(command_for(named, keys_, {1, kDrive}, "second"), 1000), Verdict::kObeyed);
+}
+
+TEST_F(Gate, ACommandWithoutAHolderIsRefused) {
+  signed_command_t m = command_for(gate_, keys_, {1, kDrive});
+  set_name("", &m.holder);
+  sign(keys_, "mbbr", &m);
+  EXPECT_EQ(gate_.accept(m, 1000), Verdict::kRefused);
+}
+
+TEST(CommandNameFields, HoldNamesOfEveryAllowedLength) {
+  std::uint8_t field[CommandKeys::kLongestName];
+  set_name("sixteen-letters-", &field);
+  EXPECT_EQ(name_in(field), "sixteen-letters-");
+  set_name("a", &field);
+  EXPECT_EQ(name_in(field), "a") << "nothing of the one before";
+  set_name("seventeen-letters", &field);
+  EXPECT_EQ(name_in(field), "seventeen-letter");
+  field[0] = ' ';
+  EXPECT_EQ(name_in(field), "");
+}
+
 TEST_F(Gate, SaysWhoBeganTheTurn) {
   take({9, kArm});
   const command_session_t said = gate_.announcement(1000, 0);

@@ -7,9 +7,11 @@
 
 #include <cstdio>
 #include <fstream>
+#include <set>
 #include <stdexcept>
 
 #include "command_fixture.hpp"
+#include "support/file_size_limit.hpp"
 
 namespace equipoise::runtime {
 namespace {
@@ -104,6 +106,93 @@ TEST_F(KeyFile, AfterARotationOldKeysAreWorthless) {
   EXPECT_TRUE(convinces(now, now, "anna"));
   now.of_holder("anna").save(path_ + ".anna");
   EXPECT_THROW(CommandKeys::rotate(path_ + ".anna"), std::runtime_error);
+}
+
+TEST_F(KeyFile, IsPlainTextOfOneLine) {
+  keys_of(0xAB).save(path_);
+  std::string text;
+  std::getline(std::ifstream(path_), text, '\0');
+  EXPECT_EQ(text, "equipoise-key-1 robot mbbr ab" + std::string(62, '0') + "\n");
+  std::remove(path_.c_str());
+  keys_of(0xAB).of_holder("anna").save(path_);
+  std::getline(std::ifstream(path_), text, '\0');
+  EXPECT_EQ(text.substr(0, 32), "equipoise-key-1 holder mbbr anna");
+  EXPECT_EQ(text.size(), 32U + 2U * 65U + 1U);
+}
+
+TEST_F(KeyFile, OfAHolderWithBadNamesIsRefused) {
+  const std::string hex(64, 'a');
+  for (const std::string names : {"mb/br anna", "mbbr an/na"}) {
+    std::ofstream(path_) << "equipoise-key-1 holder " << names << " " << hex << " " << hex << "\n";
+    ASSERT_EQ(chmod(path_.c_str(), 0600), 0);
+    EXPECT_NE(complaint().find("is no key"), std::string::npos) << names;
+  }
+}
+
+TEST_F(KeyFile, KeysAreMadeForProperNamesOnly) {
+  EXPECT_THROW(CommandKeys::create(path_, "mb br"), std::runtime_error);
+  EXPECT_THROW(CommandKeys::load(path_), std::runtime_error) << "and no file is left";
+  EXPECT_THROW(keys_of(1).of_holder("an na"), std::runtime_error);
+  EXPECT_THROW(keys_of(1, ""), std::runtime_error);
+}
+
+TEST_F(KeyFile, IsAFile) {
+  ASSERT_EQ(mkdir(path_.c_str(), 0700), 0);
+  EXPECT_NE(complaint().find("is no file"), std::string::npos);
+  rmdir(path_.c_str());
+}
+
+TEST_F(KeyFile, OfAnotherUserIsRefused) {
+  CommandKeys::create(path_, "mbbr");
+  if (chown(path_.c_str(), 12345, 12345) != 0) GTEST_SKIP() << "needs root";
+  EXPECT_NE(complaint().find("belongs to another user"), std::string::npos);
+}
+
+TEST_F(KeyFile, ThatCannotBeWrittenIsNotLeftBehind) {
+  std::string text;
+  try {
+    const FileSizeLimit little(8);
+    CommandKeys::create(path_, "mbbr");
+  } catch (const std::runtime_error& error) {
+    text = error.what();
+  }
+  EXPECT_NE(text.find("cannot be written"), std::string::npos) << text;
+  EXPECT_NE(access(path_.c_str(), F_OK), 0);
+}
+
+TEST_F(KeyFile, ARotationThatWasInterruptedIsNoHindrance) {
+  CommandKeys::create(path_, "mbbr");
+  std::ofstream(path_ + ".new") << "half a key";
+  CommandKeys::rotate(path_);
+  EXPECT_EQ(complaint(), "loaded");
+  EXPECT_NE(access((path_ + ".new").c_str(), F_OK), 0);
+}
+
+TEST_F(KeyFile, ReadingAndWritingLeaveNoDescriptorOpen) {
+  const int first = dup(STDERR_FILENO);
+  close(first);
+  CommandKeys::create(path_, "mbbr");
+  EXPECT_EQ(complaint(), "loaded");
+  EXPECT_THROW(CommandKeys::create(path_, "mbbr"), std::runtime_error);
+  const int after = dup(STDERR_FILENO);
+  EXPECT_EQ(after, first);
+  close(after);
+}
+
+TEST(CommandKeys, EveryPurposeAndHolderHasAnother) {
+  const CommandKeys robot = keys_of(1);
+  const std::string announcements = robot.announcements().hex();
+  const std::string anna = robot.commands("anna").hex();
+  const std::string berta = robot.commands("berta").hex();
+  const std::string secret = CommandKey(CommandKey::Bytes{1}).hex();
+  EXPECT_EQ((std::set<std::string>{announcements, anna, berta, secret}).size(), 4U);
+  EXPECT_EQ(robot.of_holder("anna").commands("anna").hex(), anna);
+  EXPECT_EQ(robot.of_holder("anna").announcements().hex(), announcements);
+}
+
+TEST(CommandNames, EndWhereTheirLettersEnd) {
+  for (const char* good : {"a", "z", "A", "Z", "0", "9"}) EXPECT_TRUE(is_command_name(good)) << good;
+  for (const char* bad : {"`", "{", "@", "[", "/", ":"}) EXPECT_FALSE(is_command_name(bad)) << bad;
 }
 
 TEST(CommandNames, AreShortAndPlain) {

@@ -128,6 +128,93 @@ TEST_F(Sender, TellsWhoWasFaster) {
   EXPECT_EQ(link.turn_holder, "berta");
 }
 
+TEST_F(Sender, SignsWhatItIsToldInSequence) {
+  meet(1000);
+  auto& link = sender_.links().front();
+  const std::int64_t before = link.signed_up_to;
+  const signed_command_t m = sender_.sign(&link, 5, signed_command_t::DRIVE, {{0.1, -0.2}, 0.3});
+  EXPECT_EQ(m.sequence, before + 1);
+  EXPECT_EQ(link.signed_up_to, before + 1);
+  EXPECT_EQ(m.session, link.session);
+  EXPECT_EQ(m.heard_ms, 1000);
+  EXPECT_EQ(m.turn, 5);
+  EXPECT_EQ(m.velocity_W_m_s[0], 0.1);
+  EXPECT_EQ(m.velocity_W_m_s[1], -0.2);
+  EXPECT_EQ(m.yaw_rate_rad_s, 0.3);
+  EXPECT_EQ(name_in(m.holder), "anna");
+  EXPECT_NE(m.sender, 0);
+  EXPECT_TRUE(authentic(keys_, "mbbr", m));
+}
+
+TEST_F(Sender, FollowsNewsAndNoRecordingOfATurn) {
+  meet(1000);
+  auto& link = sender_.links().front();
+  command_session_t before = says(1100);
+  EXPECT_TRUE(sender_.hear(says(1000))) << "the same instant is no recording";
+  const signed_command_t arm = sender_.sign(&link, link.turn, signed_command_t::ARM);
+  ASSERT_EQ(robot_.accept(arm, 1010), Verdict::kObeyed);
+  ASSERT_TRUE(sender_.hear(robot_.announcement(1010, command_session_t::ARMED, arm.sender)));
+  EXPECT_EQ(link.turn, 1);
+  EXPECT_EQ(link.turn_sequence, arm.sequence);
+  EXPECT_EQ(link.state, +command_session_t::ARMED);
+  EXPECT_EQ(link.heard_ms, 1010);
+  EXPECT_FALSE(sender_.hear(before)) << "of an earlier turn, although its clock is later";
+  EXPECT_EQ(link.turn, 1);
+}
+
+TEST_F(Sender, AnAnswerConfirmsWhatWasSignedAndNoMore) {
+  meet(1000);
+  auto& link = sender_.links().front();
+  const std::int64_t confirmed = link.confirmed;
+  const signed_command_t m = sender_.sign(&link, 0, signed_command_t::DRIVE);
+  robot_.accept(m, 1010);
+  sender_.hear(says(1010));
+  EXPECT_EQ(link.confirmed, confirmed) << "said to nobody";
+  sender_.hear(says(1011, m.sender));
+  EXPECT_EQ(link.confirmed, m.sequence);
+  link.signed_up_to = m.sequence - 1;
+  link.confirmed = confirmed;
+  sender_.hear(says(1012, m.sender));
+  EXPECT_EQ(link.confirmed, confirmed) << "of a message that it has not signed";
+}
+
+TEST_F(Sender, AClockBelowZeroIsNone) {
+  EXPECT_FALSE(sender_.hear(says(-1)));
+  EXPECT_FALSE(sender_.ask());
+  sender_.hear(says(0));
+  EXPECT_TRUE(sender_.ask());
+}
+
+TEST_F(Sender, IsDeafOnlyWhenItUnderstandsNobody) {
+  CommandSender stranger(keys_of(2), "", "anna");
+  EXPECT_FALSE(stranger.deaf());
+  stranger.hear(says(1000));
+  EXPECT_TRUE(stranger.deaf());
+  const CommandGate own(keys_of(2), 500);
+  stranger.hear(own.announcement(1000, 0));
+  EXPECT_FALSE(stranger.deaf());
+}
+
+TEST_F(Sender, AQuestionKeepsTheClockThatItAnswers) {
+  sender_.hear(says(1000));
+  sender_.hear(says(900));  // older: no news
+  const auto question = sender_.ask();
+  ASSERT_TRUE(question);
+  EXPECT_EQ(question->heard_ms, 1000);
+  EXPECT_EQ(question->action, +signed_command_t::ASK);
+  EXPECT_EQ(question->turn, 0);
+  sender_.hear(says(1001));
+  EXPECT_EQ(sender_.ask()->heard_ms, 1001);
+}
+
+TEST(SenderKeys, OfARobotSpeakForItsOwnerUnlessToldOtherwise) {
+  const CommandKeys keys = keys_of(1);
+  CommandGate robot(keys, 500);
+  CommandSender sender(keys, "", "");
+  sender.hear(robot.announcement(0, 0));
+  EXPECT_EQ(name_in(sender.ask()->holder), "owner");
+}
+
 TEST(SenderKeys, AHolderIsWhoTheKeySays) {
   EXPECT_NO_THROW(CommandSender(keys_of(1).of_holder("anna"), "", ""));
   EXPECT_NO_THROW(CommandSender(keys_of(1).of_holder("anna"), "", "anna"));

@@ -3,15 +3,15 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/file.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 
 #include "equipoise/runtime/log_parts.hpp"
+#include "support/file_size_limit.hpp"
+#include "support/log_folder.hpp"
 
 namespace equipoise::runtime {
 namespace {
@@ -20,15 +20,8 @@ namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-class LogWriterTest : public testing::Test {
+class LogWriterTest : public LogFolder {
  protected:
-  LogWriterTest() {
-    char name[] = "/tmp/equipoise-log-XXXXXX";
-    folder_ = mkdtemp(name);
-    path_ = (folder_ / "run.lcm").string();
-  }
-  ~LogWriterTest() override { fs::remove_all(folder_); }
-
   // Two events of 100 bytes.
   static void write_tick(LogWriter* log) {
     log->event(0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
@@ -38,9 +31,6 @@ class LogWriterTest : public testing::Test {
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name) << text;
   }
-
-  fs::path folder_;
-  std::string path_;
 };
 
 TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
@@ -58,14 +48,10 @@ TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
 TEST_F(LogWriterTest, ADiskThatFillsUpInsideATickCostsTheWholeTick) {
   LogWriter log;
   ASSERT_TRUE(log.open(path_, {}));
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{550, before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-  for (int tick = 0; tick < 5; ++tick) write_tick(&log);
-  setrlimit(RLIMIT_FSIZE, &before);
-  signal(SIGXFSZ, SIG_DFL);
+  {
+    const FileSizeLimit small(550);
+    for (int tick = 0; tick < 5; ++tick) write_tick(&log);
+  }
   EXPECT_FALSE(log.is_open());
   EXPECT_THAT(log.error(), HasSubstr("log stopped: File too large"));
   EXPECT_EQ(fs::file_size(path_), 400U);
@@ -120,6 +106,109 @@ TEST_F(LogWriterTest, KeptLogsGoBeforeTheRunsOwnFilesWhenSpaceIsShort) {
   EXPECT_TRUE(kept_logs(path_).empty());
   EXPECT_THAT(log.error(), HasSubstr("No space left"));
   EXPECT_EQ(fs::file_size(path_), 200U);
+}
+
+TEST_F(LogWriterTest, AnEventIsWhatLcmsLogsHold) {
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {}));
+  log.event(1, "A", {0xAA});
+  log.event(0x0102030405060708, "CH", {0xBB, 0xCC, 0xDD});
+  log.end_tick();
+  std::string bytes;
+  std::getline(std::ifstream(path_, std::ios::binary), bytes, '\n');
+  const auto text = [](const char* literal, std::size_t size) { return std::string(literal, size); };
+  // sync, event number, time in us, lengths of channel and data
+  EXPECT_EQ(bytes, text("\xED\xA1\xDA\x01\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\1\0\0\0\1\0\0\0\1"
+                        "A\xAA",
+                        30) +
+                       text("\xED\xA1\xDA\x01\0\0\0\0\0\0\0\1\1\2\3\4\5\6\7\x8\0\0\0\2\0\0\0\3"
+                            "CH\xBB\xCC\xDD",
+                            33));
+}
+
+TEST_F(LogWriterTest, WithoutAFileNothingIsWritten) {
+  LogWriter log;
+  EXPECT_FALSE(log.is_open());
+  write_tick(&log);
+  log.close();
+  EXPECT_FALSE(log.open((folder_ / "none" / "run.lcm").string(), {}));
+  EXPECT_THAT(log.error(), HasSubstr("none/run.lcm: log cannot be created: No such file or directory"));
+  EXPECT_FALSE(log.is_open());
+  write_tick(&log);
+}
+
+TEST_F(LogWriterTest, ADeviceMayTakeTheLog) {
+  LogWriter log;
+  EXPECT_TRUE(log.open("/dev/null", {})) << log.error();
+  write_tick(&log);
+  EXPECT_TRUE(log.is_open());
+  LogWriter full;
+  ASSERT_TRUE(full.open("/dev/full", {}));
+  write_tick(&full);
+  EXPECT_THAT(full.error(), HasSubstr("log stopped: No space left on device"));
+}
+
+TEST_F(LogWriterTest, AnotherProcessFindsTheLogLockedUntilItIsClosed) {
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {}));
+  LogWriter second;
+  EXPECT_FALSE(second.open(path_, {}));
+  EXPECT_THAT(second.error(), HasSubstr("another process is writing it"));
+  log.close();
+  EXPECT_FALSE(log.is_open());
+  LogWriter third;
+  EXPECT_TRUE(third.open(path_, {}));
+}
+
+TEST_F(LogWriterTest, WhatWasNotYetWrittenIsWrittenAtTheEnd) {
+  {
+    LogWriter log;
+    ASSERT_TRUE(log.open(path_, {}));
+    log.event(0, "CHANNEL1", std::vector<std::uint8_t>(64));
+  }
+  EXPECT_EQ(fs::file_size(path_), 100U);
+}
+
+TEST_F(LogWriterTest, AFileIsFullWhenItHasReachedItsSize) {
+  LogWriter log;
+  LogLimits limits;
+  limits.max_bytes = 200;
+  ASSERT_TRUE(log.open(path_, limits));
+  for (int tick = 0; tick < 2; ++tick) write_tick(&log);
+  log.close();
+  EXPECT_EQ(fs::file_size(path_), 200U);
+  EXPECT_EQ(fs::file_size(log_part(path_, 1)), 28U + 200U) << "with the empty preamble";
+  EXPECT_EQ(existing_log_parts(path_).size(), 3U) << "the next is begun at once";
+}
+
+TEST_F(LogWriterTest, AFurtherPartThatExistsIsNotOverwritten) {
+  LogWriter log;
+  LogLimits limits;
+  limits.max_bytes = 200;
+  ASSERT_TRUE(log.open(path_, limits));
+  write("run.0001.lcm", "somebody's");
+  write_tick(&log);
+  EXPECT_FALSE(log.is_open());
+  EXPECT_THAT(log.error(), HasSubstr("run.0001.lcm: log cannot be created: File exists"));
+  EXPECT_EQ(fs::file_size(log_part(path_, 1)), 10U);
+}
+
+TEST_F(LogWriterTest, LeavesNoDescriptorOpen) {
+  const int first = dup(STDERR_FILENO);
+  close(first);
+  for (int i = 0; i < 2; ++i) {
+    LogWriter log;
+    LogLimits limits;
+    limits.max_bytes = 200;
+    limits.sync = true;
+    ASSERT_TRUE(log.open(path_, limits));
+    for (int tick = 0; tick < 3; ++tick) write_tick(&log);
+    LogWriter second;
+    EXPECT_FALSE(second.open(path_, {}));
+  }
+  const int after = dup(STDERR_FILENO);
+  EXPECT_EQ(after, first);
+  close(after);
 }
 
 TEST_F(LogWriterTest, APreambleStartsEveryFile) {

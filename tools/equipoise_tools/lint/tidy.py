@@ -10,6 +10,7 @@ import shlex
 import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 from .law import includes
@@ -21,34 +22,52 @@ ANALYZER = [
     f"--extra-arg={word}"
     for word in ("-Xclang", "-analyzer-config", "-Xclang", "c++-template-inlining=false")
 ]
+SOURCES_INCLUDED = "bugprone-suspicious-include"  # which a folder's unit does
 _DIAGNOSTIC = re.compile(r"^(?P<path>/[^:\n]+):(?P<line>\d+):\d+: (?:warning|error): (?P<message>.*)$", re.M)
 
 
-def file_by_file(build: Path) -> list[dict]:
-    """The compile database, with the files of a folder that is compiled as one unit in that unit's place."""
-    entries = []
+@dataclass(frozen=True)
+class Job:
+    """A translation unit and what is looked for in it."""
+
+    entry: dict  # of a compile database
+    checks: str = ""  # added to those of .clang-tidy
+
+    @property
+    def file(self) -> Path:
+        return Path(self.entry["directory"], self.entry["file"])
+
+    @property
+    def command(self) -> list[str]:
+        return self.entry.get("arguments") or shlex.split(self.entry["command"])
+
+
+def own(path: Path, root: Path) -> bool:
+    return any(path.resolve().is_relative_to(root / folder) for folder in ("src", "drivers"))
+
+
+def jobs_of(tree: Tree, build: Path) -> list[Job]:
+    """Of a folder that is compiled as one unit: all but the analyzer on the unit, so that its headers are
+    read once; the analyzer, which skips what is included, on every file."""
+    words = re.split(r"[\s,]+", (tree.root / ".clang-tidy").read_text())
+    analyzer = [word for word in words if "clang-analyzer" in word]
+    file_by_file = ",".join(["-*", SOURCES_INCLUDED, *analyzer])
+    jobs = []
     for entry in json.loads((build / "compile_commands.json").read_text()):
         unit = Path(entry["directory"], entry["file"])
         if unit.parent.name != "Unity":
-            entries.append(entry)
+            jobs += [Job(entry)] if own(unit, tree.root) else []
             continue
-        command = entry.get("arguments") or shlex.split(entry["command"])
-        for _, member, _ in includes(unit.read_text()):
-            arguments = [member if Path(part) == unit else part for part in command]
-            entries.append({"directory": entry["directory"], "file": member, "arguments": arguments})
-    return entries
-
-
-def own_units(tree: Tree, build: Path) -> list[tuple[str, list[str]]]:
-    """(file, compile command) of the translation units of src and drivers in the compile database."""
-    units = {}
-    for entry in file_by_file(build):
-        path = Path(entry["directory"], entry["file"]).resolve()
-        if path.is_relative_to(tree.root):
-            name = str(path.relative_to(tree.root))
-            if name.startswith(("src/", "drivers/")):
-                units[name] = entry.get("arguments") or shlex.split(entry["command"])
-    return sorted(units.items())
+        members = [Path(member) for _, member, _ in includes(unit.read_text())]
+        if not any(own(member, tree.root) for member in members):
+            continue
+        jobs.append(Job(entry, f"-clang-analyzer-*,-{SOURCES_INCLUDED}"))
+        command = Job(entry).command
+        for member in members:
+            arguments = [str(member) if Path(part) == unit else part for part in command]
+            alone = {"directory": entry["directory"], "file": str(member), "arguments": arguments}
+            jobs.append(Job(alone, file_by_file))
+    return jobs
 
 
 def include_folders(command: list[str], root: Path) -> list[Path]:
@@ -57,10 +76,10 @@ def include_folders(command: list[str], root: Path) -> list[Path]:
     return [Path(folder) for folder in folders if Path(folder).is_relative_to(root)]
 
 
-def closure(name: str, folders: list[Path], tree: Tree) -> set[Path]:
+def closure(file: Path, folders: list[Path]) -> set[Path]:
     """The file and every header inside the tree (generated ones too) that it reaches."""
     reached: set[Path] = set()
-    waiting = [tree.root / name]
+    waiting = [file.resolve()]
     while waiting:
         path = waiting.pop()
         if path in reached:
@@ -74,24 +93,24 @@ def closure(name: str, folders: list[Path], tree: Tree) -> set[Path]:
     return reached
 
 
-def fingerprint(name: str, command: list[str], tree: Tree, settings: bytes) -> str:
+def fingerprint(job: Job, root: Path, settings: bytes) -> str:
     digest = hashlib.sha256(settings)
-    digest.update(shlex.join(command).encode())
-    for path in sorted(closure(name, include_folders(command, tree.root), tree)):
+    digest.update(shlex.join([*job.command, job.checks]).encode())
+    for path in sorted(closure(job.file, include_folders(job.command, root))):
         digest.update(str(path).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
 
-def check_unit(name: str, tree: Tree, database: Path) -> list[Finding]:
-    command = [TOOL, "--quiet", *ANALYZER, "-p", str(database), str(tree.root / name)]
-    result = subprocess.run(command, cwd=tree.root, capture_output=True, text=True)
+def run(job: Job, root: Path, database: Path) -> list[Finding]:
+    command = [TOOL, "--quiet", *ANALYZER, "-p", str(database)]
+    command += [f"--checks={job.checks}"] if job.checks else []
+    result = subprocess.run([*command, str(job.file)], cwd=root, capture_output=True, text=True)
     findings = []
     for match in _DIAGNOSTIC.finditer(result.stdout):
-        findings.append(
-            Finding(os.path.relpath(match["path"], tree.root), int(match["line"]), match["message"])
-        )
+        findings.append(Finding(os.path.relpath(match["path"], root), int(match["line"]), match["message"]))
     if result.returncode != 0 and not findings:
-        findings.append(Finding(name, 0, f"{TOOL} failed: {(result.stderr or result.stdout).strip()[-500:]}"))
+        said = (result.stderr or result.stdout).strip()[-500:]
+        findings.append(Finding(os.path.relpath(job.file, root), 0, f"{TOOL} failed: {said}"))
     return findings
 
 
@@ -103,22 +122,21 @@ def clang_tidy(tree: Tree, build: Path | None = None, jobs: int | None = None) -
         return [Finding(str(build), 0, "has no compile_commands.json; configure first: cmake --preset host")]
     cache = build / "tidy"
     cache.mkdir(exist_ok=True)
+    todo = jobs_of(tree, build)
     database = build / "tidy-database"
     database.mkdir(exist_ok=True)
-    (database / "compile_commands.json").write_text(json.dumps(file_by_file(build)))
+    (database / "compile_commands.json").write_text(json.dumps([job.entry for job in todo]))
     version = subprocess.run([TOOL, "--version"], capture_output=True, check=True).stdout
     settings = (tree.root / ".clang-tidy").read_bytes() + version + " ".join(ANALYZER).encode()
-    stamps = {
-        name: cache / fingerprint(name, command, tree, settings) for name, command in own_units(tree, build)
-    }
-    changed = [name for name, stamp in stamps.items() if not stamp.exists()]
+    stamps = {job.file: cache / fingerprint(job, tree.root, settings) for job in todo}
+    changed = [job for job in todo if not stamps[job.file].exists()]
     for old in set(cache.iterdir()) - set(stamps.values()):
         old.unlink()
 
-    def check_and_remember(name: str) -> list[Finding]:
-        findings = check_unit(name, tree, database)
+    def check_and_remember(job: Job) -> list[Finding]:
+        findings = run(job, tree.root, database)
         if not findings:
-            stamps[name].touch()
+            stamps[job.file].touch()
         return findings
 
     with ThreadPoolExecutor(jobs or os.cpu_count()) as pool:

@@ -32,6 +32,14 @@ def drawn(room: Room, name: str, root: Path, sample: int, seed: int) -> list[tup
     return every[:sample] if sample else every
 
 
+def unseen(
+    room: Room, name: str, root: Path, sample: int, seed: int, learnt: list[int]
+) -> list[tuple[Path, str, Mutant]]:
+    """A sample of another seed without the mutants of the samples for which tests were written."""
+    known = {each for one in learnt for each in drawn(room, name, root, sample, one)}
+    return [each for each in drawn(room, name, root, 0, seed) if each not in known][:sample]
+
+
 def kept(
     store: Store, chosen: list[tuple[Path, str, Mutant]], tests: str
 ) -> list[tuple[Path, str, Mutant, Outcome]]:
@@ -79,9 +87,10 @@ class Campaign:
         print(f"{outcome.status:12} {file}:{mutant.line} {mutant.change[:90]}", file=sys.stderr, flush=True)
         return outcome
 
-    def go(self, name: str, room: Room, sample: int, seed: int) -> list[tuple[Path, str, Mutant, Outcome]]:
+    def go(
+        self, name: str, room: Room, chosen: list[tuple[Path, str, Mutant]]
+    ) -> list[tuple[Path, str, Mutant, Outcome]]:
         tests = tests_of(room, self.root)
-        chosen = drawn(room, name, self.root, sample, seed)
         known = [self.store.known(key_of(file, mutant.of(text)), tests) for file, text, mutant in chosen]
         print(f"{name}: {len(chosen)} mutants, {sum(map(bool, known))} known", file=sys.stderr, flush=True)
         with ThreadPoolExecutor(self.jobs) as pool:
@@ -108,6 +117,15 @@ def main() -> int:
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)} (default: all)")
     parser.add_argument("--sample", type=int, default=40, help="mutants per room (default 40; 0: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
+    parser.add_argument(
+        "--learnt",
+        type=int,
+        nargs="+",
+        default=[],
+        metavar="SEED",
+        help="samples for which tests were written: they are judged, too, and counted apart; that of --seed "
+        "has none of their mutants",
+    )
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time (default: the cores)")
     parser.add_argument("--list", action="store_true", help="print the sample and change nothing")
     parser.add_argument(
@@ -120,6 +138,8 @@ def main() -> int:
         parser.error(f"no room {', '.join(unknown)}; there are: {', '.join(ROOMS)}")
     root = repository_root()
     chosen = {name: ROOMS[name] for name in options.rooms or ROOMS}
+    if options.learnt and not options.sample:
+        parser.error("--learnt needs a --sample: of all mutants none is left unseen")
     if options.list:
         for name, room in chosen.items():
             for file, _, mutant in drawn(room, name, root, options.sample, options.seed):
@@ -130,21 +150,34 @@ def main() -> int:
     place = root / "build" / "mutation"
     place.mkdir(parents=True, exist_ok=True)
     store = Store(place / "results.jsonl")
+    samples = {
+        name: (
+            unseen(room, name, root, options.sample, options.seed, options.learnt)
+            if options.learnt
+            else drawn(room, name, root, options.sample, options.seed)
+        )
+        for name, room in chosen.items()
+    }
+    learnt = {
+        (name, seed): drawn(room, name, root, options.sample, seed)
+        for name, room in chosen.items()
+        for seed in options.learnt
+    }
     if options.kept:
-        measured = {
-            name: kept(store, drawn(room, name, root, options.sample, options.seed), tests_of(room, root))
-            for name, room in chosen.items()
-        }
+
+        def outcomes(name: str, sample: list[tuple[Path, str, Mutant]]):
+            return kept(store, sample, tests_of(ROOMS[name], root))
+
+        measured = {name: outcomes(name, sample) for name, sample in samples.items()}
+        before = {key: outcomes(key[0], sample) for key, sample in learnt.items()}
     else:
         with tempfile.TemporaryDirectory(dir=place, prefix="work-") as work:
             campaign = Campaign(root, store, options.jobs, Path(work))
-            measured = {
-                name: campaign.go(name, room, options.sample, options.seed) for name, room in chosen.items()
-            }
+            measured = {name: campaign.go(name, ROOMS[name], sample) for name, sample in samples.items()}
+            before = {key: campaign.go(key[0], ROOMS[key[0]], sample) for key, sample in learnt.items()}
     why = reasons(root)
-    text, unexplained = write_page(
-        measured, why, None if options.kept else options.sample, options.seed, root
-    )
+    sample = None if options.kept else options.sample
+    text, unexplained = write_page(measured, why, sample, options.seed, root, before)
     if options.rooms and not options.page:
         print(text)
     else:

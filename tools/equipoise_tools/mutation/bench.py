@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -61,6 +62,17 @@ class Build:
         return tuple(words[words.index("&&") + 1 : -2])
 
     @cache  # noqa: B019
+    def unit(self, source: Path) -> tuple[Path, ...]:
+        """The other sources that the build compiles together with this one."""
+        line = f'#include "{self.root / source}"\n'
+        for unit in sorted(self.folder.glob("CMakeFiles/*.dir/Unity/*.cxx")):
+            text = unit.read_text()
+            if line in text:
+                found = re.findall(r'^#include "(.*)"$', text, re.M)
+                return tuple(p for p in (Path(f).relative_to(self.root) for f in found) if p != source)
+        return ()
+
+    @cache  # noqa: B019
     def includes(self, test_object: str) -> frozenset[str]:
         text = subprocess.run(
             ["ninja", "-t", "deps", test_object], cwd=self.folder, capture_output=True, text=True, check=True
@@ -101,6 +113,7 @@ class Worker:
         self.overlay = folder / "source"
         folder.mkdir(parents=True, exist_ok=True)
         self.program_tests: dict[str, Path] = {}
+        self.companions: dict[Path, Path] = {}
 
     def compile(self, source: Path, text: str | None, defines: tuple[str, ...] = ()) -> Path | None:
         """The object of a source of the project, with the mutated file before the others."""
@@ -145,7 +158,7 @@ class Worker:
     def prepare(self, stage: Stage, file: Path, text: str, changed: Path | None) -> Path | None:
         """The binary of a stage with this text for the file; None: it is not to be built."""
         linked, own = self.tests_of(stage)
-        first = [changed] if changed else []
+        first = [changed, *self.beside(file)] if changed else []
         if changed is None:  # a header: all that sees it
             place = self.overlay / file
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -166,6 +179,16 @@ class Worker:
             objects = [*first, *(self.bound(stage, made, program) for made in linked)]
         binary = self.folder / Path(stage.binary).name
         return binary if self.join(stage.binary, list(map(str, objects)), own, binary) else None
+
+    def beside(self, file: Path) -> list[Path]:
+        """What the build compiles together with a file, here apart: there, its functions may be inlined."""
+        for source in self.build.unit(file):
+            if source not in self.companions:
+                made = self.compile(source, None)
+                if made is None:
+                    raise RuntimeError(f"{source} does not compile")
+                self.companions[source] = made.rename(made.with_suffix(".beside.o"))
+        return [self.companions[source] for source in self.build.unit(file)]
 
     def bound(self, stage: Stage, made: str, program: Path) -> str:
         """A test that starts this worker's program."""

@@ -12,7 +12,10 @@ from .generate import Mutant, mutants
 from .rooms import ROOMS
 from .store import OLDER_TESTS
 
+Outcomes = list[tuple[Path, str, Mutant, Outcome]]
+Measured = dict[str, Outcomes]
 KILLED = ("killed", "timeout")
+FEWEST = 20  # mutants that say something about a room
 HEAD = """# Mutation testing
 Written by `tools/mutation`. A mutant is the firmware with one token changed: a relation (`<` → `<=`), an
 operator (`+` → `-`, `&&` → `||`), a number (n → n + 1, x → 2 x), a condition negated, a statement
@@ -20,9 +23,10 @@ removed. It is killed when a test of its room fails or exceeds ten times its usu
 compile, or to the same object code, are not counted.
 
 {what} Seed {seed}; intervals are Wilson's, 95 %.
-
-| room | mutants in all | drawn | killed | survived | kill rate | wanted | holds |
-|---|---|---|---|---|---|---|---|
+"""
+TABLE = """
+| room | mutants in all | drawn | killed | survived | kill rate | wanted | holds |{more}
+|---|---|---|---|---|---|---|---|{rule}
 """
 
 
@@ -43,14 +47,24 @@ def cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
+def counted(outcomes: Outcomes) -> tuple[int, int]:
+    """Tried, killed."""
+    counts = Counter(outcome.status for *_, outcome in outcomes)
+    killed = sum(counts[status] for status in KILLED)
+    return killed + counts["survived"], killed
+
+
 def write_page(
-    measured: dict[str, list[tuple[Path, str, Mutant, Outcome]]],
+    measured: Measured,
     why: dict[tuple[str, str, str], str],
     sample: int | None,
     seed: int,
     root: Path,
+    learnt: dict[tuple[str, int], Outcomes] | None = None,
 ) -> tuple[str, list[str]]:
-    """The page, and survivors without a reason. `sample`: None of kept outcomes, 0 of all mutants."""
+    """The page, and survivors without a reason. `sample`: None of kept outcomes, 0 of all mutants. `learnt`:
+    outcomes of other samples by room and seed, for which tests were written."""
+    learnt = learnt or {}
     what = f"At most {sample} mutants per room, drawn at random." if sample else "All mutants."
     if sample is None:
         what = (
@@ -58,23 +72,39 @@ def write_page(
             "Survivors of older tests have not been tried on today's: kill rates are lower bounds."
         )
     page = HEAD.format(what=what, seed=seed)
+    seeds = " and ".join(str(seed) for seed in sorted({seed for _, seed in learnt}))
+    if learnt:
+        page += (
+            f"The samples of seed {seeds} showed what the tests lacked, and tests were written for them; "
+            "none of their\nmutants is in this one, whose rate is the one that holds or not.\n"
+        )
+    page += TABLE.format(more=f" seed {seeds} |" if learnt else "", rule="---|" if learnt else "")
     survivors, unexplained = "", []
     for name, outcomes in measured.items():
-        counts = Counter(outcome.status for *_, outcome in outcomes)
-        killed = sum(counts[status] for status in KILLED)
-        tried = killed + counts["survived"]
+        tried, killed = counted(outcomes)
+        seen = {
+            (file, mutant): (file, text, mutant, outcome)
+            for (room, _), some in learnt.items()
+            if room == name
+            for file, text, mutant, outcome in some
+        }
+        more = ""
+        if learnt:
+            before, noticed = counted(list(seen.values()))
+            more = f" {noticed} of {before} |" if before else " not measured |"
         target = ROOMS[name].target
         whole = sum(len(mutants(path.read_text())) for path in ROOMS[name].paths(root))
-        if not tried:
-            page += f"| {name} | {whole} | 0 | | | not measured | {100 * target:.0f} % | not measured |\n"
-            continue
-        share = killed / tried
-        low, high = wilson(killed, tried)
-        rate = f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
-        holds = "yes" if share >= target else "**no**"
-        row = (name, whole, tried, killed, counts["survived"], rate, f"{100 * target:.0f} %", holds)
-        page += f"| {' | '.join(map(str, row))} |\n"
-        for file, text, mutant, outcome in outcomes:
+        if tried:
+            share = killed / tried
+            low, high = wilson(killed, tried)
+            rate = f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+            holds = "yes" if share >= target else "**no**"
+            holds = holds if tried >= FEWEST else "too few"
+            row = (name, whole, tried, killed, tried - killed, rate, f"{100 * target:.0f} %", holds)
+        else:
+            row = (name, whole, 0, "", "", "not measured", f"{100 * target:.0f} %", "not measured")
+        page += f"| {' | '.join(map(str, row))} |{more}\n"
+        for file, text, mutant, outcome in [*seen.values(), *outcomes]:
             if outcome.status != "survived":
                 continue
             code = line_of(text, mutant)

@@ -40,12 +40,18 @@ class Room:
 DRIVER_FIXTURES = ("drivers/testbed.cpp", "drivers/fake_imu.cpp", "drivers/syscall_journal.cpp")
 # Whose tests are asked first; all others, too, when those do not notice.
 DRIVER_TESTS = {
-    **{name: name for name in ("adc", "can", "cutoff", "dmp", "eqep", "mpu9250", "pwm", "serial", "sysfs")},
+    **{
+        name: name
+        for name in ("adc", "cutoff", "eqep", "events", "i2c_dev", "mpu9250", "pwm", "serial", "sysfs")
+    },
+    **{name: f"{name}*" for name in ("can", "dmp")},
+    **dict.fromkeys(("bbb", "bbb_open", "bbb_error"), "bbb*"),
     **dict.fromkeys(("led", "button"), "led_button"),
     **dict.fromkeys(("hbridge", "mc33926", "tb6612"), "bridge"),
 }
 DRIVER_BINARY = "tests/drivers/driver_tests"
-DRIVER_OWN = (*DRIVER_FIXTURES, "drivers/fake_gpio.cpp", "drivers/board_fixture.cpp")
+DRIVER_OWN = (*DRIVER_FIXTURES, "drivers/fake_gpio.cpp", "drivers/fake_can.cpp", "drivers/board_fixture.cpp")
+ALLOCATION = "runtime/allocation_watch.cpp"  # the runtime tests' binary is linked for it
 COMMANDS = (
     *(
         "command_auth",
@@ -56,6 +62,16 @@ COMMANDS = (
         "command_wire",
     ),
 )
+
+ESTIMATORS = (
+    *("dead_encoders", "gyro_watch", "heun", "kalman", "packed_filter"),
+    *("rest_bias", "slow_drift", "time_base", "wheel_isolation"),
+)
+CONTROL_TESTS = {
+    **dict.fromkeys(("allocate", "governor"), "governor"),
+    **dict.fromkeys(("friction", "gain_schedule"), "gain_schedule"),
+    **{name: name for name in ("margins", "plausible")},
+}
 
 ROOMS: dict[str, Room] = {
     "safety": Room(
@@ -81,7 +97,12 @@ ROOMS: dict[str, Room] = {
         ("src/app/guard/guard.cpp", "src/app/guard/guard_bridges.cpp"),
         (
             Stage("tests/unit_tests", ("unit/app/guard_loop_test.cpp",)),
-            Stage("tests/runtime/runtime_tests", ("runtime/guard_test.cpp",), program=True, twice=True),
+            Stage(
+                "tests/runtime/runtime_tests",
+                ("runtime/guard_test.cpp", "runtime/guard_command_test.cpp", ALLOCATION),
+                program=True,
+                twice=True,
+            ),
         ),
         target=0.9,
     ),
@@ -94,8 +115,7 @@ ROOMS: dict[str, Room] = {
             Stage("tests/unit_tests", ("unit/app/guard_loop_test.cpp",)),
             Stage(
                 "tests/runtime/runtime_tests",
-                ("runtime/guard_test.cpp",),
-                filter="SharedHeartbeat*:Supervisor*",
+                ("runtime/heartbeat_test.cpp", ALLOCATION),
                 twice=True,
             ),
         ),
@@ -106,7 +126,7 @@ ROOMS: dict[str, Room] = {
         (
             Stage(
                 "tests/unit_tests",
-                tuple(f"unit/runtime/{name}_test.cpp" for name in COMMANDS[:2] + COMMANDS[3:5]),
+                tuple(f"unit/runtime/{name}_test.cpp" for name in COMMANDS[:5]),
             ),
             Stage("tests/app_tests", ("app/wires_test.cpp",)),
         ),
@@ -117,7 +137,7 @@ ROOMS: dict[str, Room] = {
         (
             Stage(
                 "tests/drivers/libgpiod_tests",
-                ("drivers/libgpiod_test.cpp", *DRIVER_FIXTURES),
+                ("drivers/libgpiod_test.cpp", "drivers/gpio_v1_test.cpp", *DRIVER_FIXTURES),
                 only=("drivers/gpio*.c",),
             ),
             *(
@@ -138,8 +158,10 @@ ROOMS: dict[str, Room] = {
             *(f"src/app/log/{name}.cpp" for name in ("log_reader", "run_log")),
         ),
         (
-            Stage("tests/unit_tests", ("unit/runtime/log_writer_test.cpp",)),
-            Stage("tests/app_tests", ("app/run_log_test.cpp",)),
+            Stage(
+                "tests/unit_tests", ("unit/runtime/log_writer_test.cpp", "unit/runtime/log_parts_test.cpp")
+            ),
+            Stage("tests/app_tests", ("app/run_log_test.cpp", "app/log_reader_test.cpp")),
         ),
     ),
     "replay": Room(
@@ -152,14 +174,52 @@ ROOMS: dict[str, Room] = {
     ),
     "estimators": Room(
         ("include/equipoise/estimate/*.hpp", "include/equipoise/sense/freshness.hpp"),
-        (Stage("tests/unit_tests", ("unit/estimate/*_test.cpp", "unit/sense/freshness_test.cpp")),),
+        (
+            *(
+                Stage(
+                    "tests/unit_tests",
+                    (f"unit/estimate/{name}_test.cpp",),
+                    only=(f"include/equipoise/estimate/{name}.hpp",),
+                )
+                for name in ESTIMATORS
+            ),
+            Stage(
+                "tests/unit_tests",
+                ("unit/sense/freshness_test.cpp",),
+                only=("include/equipoise/sense/freshness.hpp",),
+            ),
+            Stage(
+                "tests/unit_tests",
+                ("unit/sense/calibrate_test.cpp",),
+                only=("include/equipoise/estimate/rest_tilt.hpp",),
+            ),
+            Stage("tests/unit_tests", ("unit/estimate/*_test.cpp",), never=("*/freshness.hpp",)),
+        ),
     ),
     "control": Room(
         ("include/equipoise/control/*.hpp", "src/control/*.cpp"),
-        (Stage("tests/unit_tests", ("unit/control/*_test.cpp",)),),
+        (
+            *(
+                Stage(
+                    "tests/unit_tests",
+                    (f"unit/control/{test}_test.cpp",),
+                    only=(f"include/equipoise/control/{name}.hpp",),
+                )
+                for name, test in CONTROL_TESTS.items()
+            ),
+            Stage("tests/unit_tests", ("unit/control/*_test.cpp",)),
+            Stage(
+                "tests/unit_tests",
+                ("unit/config/config_test.cpp",),
+                only=("*/chain.hpp", "src/control/*.cpp"),
+            ),
+        ),
     ),
     "pipeline": Room(
         ("include/equipoise/pipeline.hpp",),
-        (Stage("tests/scenario_tests", ("scenario/not_finite_test.cpp",)),),
+        tuple(
+            Stage("tests/scenario_tests", tuple(f"scenario/{test}_test.cpp" for test in tests))
+            for tests in (("not_finite",), ("reasons",), ("encoder_check", "mip_balance", "signs"))
+        ),
     ),
 }

@@ -1,0 +1,21 @@
+// Numbers as they lie in a log and on the wire: most significant byte first. In: value -> out: its bytes.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+namespace equipoise::runtime {
+
+/// Unsigned: of one, four or eight bytes. Returns the place behind.
+template <class Unsigned>
+std::uint8_t* store_big_endian(Unsigned value, std::uint8_t* to) noexcept {
+  static_assert(sizeof value == 1 || sizeof value == 4 || sizeof value == 8);
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+  if constexpr (sizeof value == 8) value = __builtin_bswap64(value);
+  if constexpr (sizeof value == 4) value = __builtin_bswap32(value);
+#endif
+  std::memcpy(to, &value, sizeof value);
+  return to + sizeof value;
+}
+
+}  // namespace equipoise::runtime

@@ -1,0 +1,176 @@
+// The page that loop and guard share, whose descriptor proves what it is, and the loop's watch over its
+// guard.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "equipoise/runtime/supervisor.hpp"
+#include "support/file_size_limit.hpp"
+
+namespace equipoise {
+namespace {
+
+constexpr std::int64_t kTick_ns = 5'000'000;
+
+/// What a descriptor is refused for; "": it is taken. The descriptor is closed.
+std::string complaint(int fd) {
+  try {
+    const runtime::SharedHeartbeat page(fd);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(SharedHeartbeat, TakesOnlySealedAnonymousPagesOfOurs) {
+  const runtime::SharedHeartbeat own;
+  EXPECT_EQ(complaint(dup(own.fd())), "");
+  EXPECT_NE(complaint(-1), "");
+  EXPECT_NE(complaint(open("/tmp", O_TMPFILE | O_RDWR, 0600)).find("sealed"), std::string::npos);
+  const auto memory = [](off_t size, int seals) {
+    const int fd = memfd_create("page", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+    EXPECT_EQ(fchmod(fd, 0600), 0);
+    EXPECT_EQ(ftruncate(fd, size), 0);
+    EXPECT_EQ(fcntl(fd, F_ADD_SEALS, seals), 0);
+    return fd;
+  };
+  constexpr off_t kSize = sizeof(runtime::HeartbeatPage);
+  constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
+  EXPECT_NE(complaint(memory(kSize, F_SEAL_GROW | F_SEAL_SEAL)).find("sealed"), std::string::npos);
+  EXPECT_NE(complaint(memory(kSize - 1, kSeals)).find("size"), std::string::npos);
+  EXPECT_NE(complaint(memory(kSize, kSeals)).find("something else"), std::string::npos);
+  const int open_to_all = memory(kSize, kSeals);
+  EXPECT_EQ(fchmod(open_to_all, 0666), 0);
+  EXPECT_NE(complaint(open_to_all).find("another user"), std::string::npos);
+}
+
+TEST(SharedHeartbeat, IsOnePageForBothSides) {
+  runtime::SharedHeartbeat own;
+  runtime::SharedHeartbeat theirs(dup(own.fd()));
+  EXPECT_EQ(own.page().loop, 0U);
+  EXPECT_EQ(own.page().guard, 0U);
+  EXPECT_EQ(own.page().cut, 0U);
+  EXPECT_EQ(own.page().want_enable, 0U);
+  own.page().loop = 7;
+  theirs.page().guard = 8;
+  EXPECT_EQ(theirs.page().loop, 7U);
+  EXPECT_EQ(own.page().guard, 8U);
+  EXPECT_NE(fcntl(own.fd(), F_GETFD) & FD_CLOEXEC, 0) << "no other program inherits it";
+  EXPECT_EQ(fcntl(own.fd(), F_GET_SEALS), F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL);
+}
+
+TEST(SharedHeartbeat, ClosesItsDescriptorAlsoWhenItRefusesIt) {
+  int fd = -1;
+  {
+    const runtime::SharedHeartbeat own;
+    fd = own.fd();
+  }
+  EXPECT_EQ(fcntl(fd, F_GETFD), -1);
+  fd = memfd_create("page", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  EXPECT_NE(complaint(fd), "");
+  EXPECT_EQ(fcntl(fd, F_GETFD), -1);
+  runtime::SharedHeartbeat other;
+  other.page().magic = runtime::HeartbeatPage::kMagic + 1;
+  fd = dup(other.fd());
+  EXPECT_NE(complaint(fd).find("something else"), std::string::npos);
+  EXPECT_EQ(fcntl(fd, F_GETFD), -1);
+}
+
+TEST(SharedHeartbeat, MemoryThatAnotherUserMayTouchIsRefused) {
+  const runtime::SharedHeartbeat own;
+  for (const mode_t mode : {0604U, 0602U, 0601U, 0640U, 0620U, 0610U}) {
+    ASSERT_EQ(fchmod(own.fd(), mode), 0);
+    EXPECT_NE(complaint(dup(own.fd())).find("another user"), std::string::npos) << std::oct << mode;
+  }
+  ASSERT_EQ(fchmod(own.fd(), 0600), 0);
+  if (fchown(own.fd(), 12345, 12345) != 0) GTEST_SKIP() << "the rest needs root";
+  EXPECT_NE(complaint(dup(own.fd())).find("another user"), std::string::npos);
+}
+
+TEST(SharedHeartbeat, AMachineWithoutRoomIsAnErrorText) {
+  std::string text;
+  try {
+    const FileSizeLimit none(0);
+    const runtime::SharedHeartbeat page;
+  } catch (const std::runtime_error& error) {
+    text = error.what();
+  }
+  EXPECT_NE(text.find("no memory for it"), std::string::npos) << text;
+}
+
+TEST(SupervisorTest, ADeadGuardForbidsMotors) {
+  runtime::HeartbeatPage page{};
+  runtime::Supervisor supervisor({&page, 0, nullptr, false});
+  RawSample raw{};
+  std::int64_t now = 1'000'000'000;
+  const auto tick = [&](bool guard_lives) {
+    now += kTick_ns;
+    raw.t_ns = now;
+    if (guard_lives) page.guard.fetch_add(2);
+    const std::uint32_t reasons = supervisor.begin(now, raw);
+    supervisor.end(true, 0);
+    return reasons;
+  };
+  EXPECT_EQ(tick(false), kGuardDead);  // never seen
+  EXPECT_EQ(tick(true), 0U);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(tick(true), 0U);
+  int silent = 0;
+  while (tick(false) == 0 && silent < 100) ++silent;
+  EXPECT_LE(silent, 6);
+  EXPECT_EQ(tick(true), 0U);
+  page.cut.fetch_add(1);  // the guard found us too late
+  EXPECT_EQ(tick(true), kOverrun);
+  EXPECT_EQ(page.loop.load(), static_cast<std::uint32_t>(105 + silent));
+}
+
+TEST(SupervisorTest, ACutIsToldOnceAndOldOnesNever) {
+  runtime::HeartbeatPage page{};
+  page.cut = 3;
+  runtime::Supervisor supervisor({&page, 0, nullptr, true});
+  RawSample raw{};
+  std::int64_t now = 1'000'000'000;
+  const auto tick = [&] {
+    raw.t_ns = now += kTick_ns;
+    page.guard.fetch_add(1);
+    const std::uint32_t reasons = supervisor.begin(now, raw);
+    supervisor.end(false, 0);
+    return reasons;
+  };
+  EXPECT_EQ(tick(), 0U);
+  page.cut = 4;
+  EXPECT_EQ(tick(), kOverrun);
+  EXPECT_EQ(tick(), 0U);
+}
+
+TEST(SupervisorTest, AFailedWriteIsForgottenWhenTheNextSucceeds) {
+  std::atomic<bool> log_failed{false};
+  runtime::Supervisor supervisor({nullptr, 0, &log_failed, true});
+  RawSample raw{};
+  std::int64_t now = 0;
+  const auto tick = [&](int error) {
+    raw.t_ns = now += kTick_ns;
+    const std::uint32_t reasons = supervisor.begin(now, raw);
+    supervisor.end(true, error);
+    return reasons;
+  };
+  EXPECT_EQ(tick(1), 0U);
+  EXPECT_EQ(tick(0), kWriteFailed) << "whatever its sign";
+  EXPECT_EQ(tick(0), 0U);
+}
+
+TEST(SupervisorTest, AFailedWriteForbidsMotors) {
+  runtime::Supervisor supervisor({nullptr, kRealtimeMissing, nullptr, false});
+  RawSample raw{};
+  raw.t_ns = kTick_ns;
+  EXPECT_EQ(supervisor.begin(kTick_ns, raw), kRealtimeMissing);
+  supervisor.end(false, -EIO);
+  raw.t_ns = 2 * kTick_ns;
+  EXPECT_EQ(supervisor.begin(2 * kTick_ns, raw), kRealtimeMissing | kWriteFailed);
+}
+
+}  // namespace
+}  // namespace equipoise

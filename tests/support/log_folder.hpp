@@ -1,0 +1,25 @@
+// A test's folder with the path of a log in it; gone afterwards.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <string>
+
+namespace equipoise {
+
+class LogFolder : public testing::Test {
+ protected:
+  LogFolder() {
+    char name[] = "/tmp/equipoise-log-XXXXXX";
+    folder_ = mkdtemp(name);
+    path_ = (folder_ / "run.lcm").string();
+  }
+  ~LogFolder() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path folder_;
+  std::string path_;
+};
+
+}  // namespace equipoise

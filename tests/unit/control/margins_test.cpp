@@ -1,0 +1,99 @@
+// Margins of loops whose margins are known in closed form.
+#include "equipoise/control/margins.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace equipoise {
+namespace {
+
+using Complex = std::complex<double>;
+constexpr Complex kJ{0.0, 1.0};
+constexpr double kPeriod_s = 0.005;
+const double kNyquist_rad_s = std::acos(-1.0) / kPeriod_s;
+const double kHalfPi = 0.5 * std::acos(-1.0);
+
+Margins of(const std::function<Complex(double)>& loop, double centre_rad_s = 0.0, double slow_rad_s = 0.0) {
+  const std::vector<double> w = frequency_grid(kPeriod_s, 2000, centre_rad_s);
+  std::vector<Complex> L;
+  L.reserve(w.size());
+  for (const double at : w) L.push_back(loop(at));
+  return margins(w, L, centre_rad_s, slow_rad_s);
+}
+
+TEST(FrequencyGrid, IsLogarithmicOnBothSidesUpToHalfTheSampling) {
+  const std::vector<double> w = frequency_grid(kPeriod_s, 5, 0.0);
+  ASSERT_EQ(w.size(), 10U);
+  EXPECT_TRUE(std::is_sorted(w.begin(), w.end()));
+  for (int i = 0; i < 5; ++i) {
+    const double expected = kNyquist_rad_s * std::pow(10.0, i - 4);
+    EXPECT_NEAR(w[static_cast<std::size_t>(5 + i)], expected, 1e-9 * expected);
+    EXPECT_EQ(w[static_cast<std::size_t>(4 - i)], -w[static_cast<std::size_t>(5 + i)]);
+  }
+}
+
+TEST(FrequencyGrid, LooksCloselyAtTheCentreToo) {
+  const std::vector<double> w = frequency_grid(kPeriod_s, 5, 30.0);
+  const auto has = [&](double at) {
+    return std::any_of(w.begin(), w.end(), [&](double x) { return std::abs(x - at) < 1e-9; });
+  };
+  const double first = 1e-4 * kNyquist_rad_s;
+  for (const double at : {first, -first, 30.0 + first, 30.0 - first, 30.0 + 0.1 * kNyquist_rad_s})
+    EXPECT_TRUE(has(at)) << at;
+  EXPECT_TRUE(std::is_sorted(w.begin(), w.end()));
+  EXPECT_LE(w.back(), kNyquist_rad_s * (1.0 + 1e-9));
+  EXPECT_GE(w.front(), -kNyquist_rad_s * (1.0 + 1e-9));
+}
+
+TEST(Margins, OfAnUnstablePlantSayHowFarTheGainMayFall) {
+  // L = k (s + 2)/(s (s - 1)): at w = sqrt(2) it is -k.
+  const Margins m = of([](double w) { return 2.0 * (kJ * w + 2.0) / (kJ * w * (kJ * w - 1.0)); });
+  EXPECT_NEAR(m.gain_down_dB, -20.0 * std::log10(2.0), 1e-3);
+  EXPECT_TRUE(std::isinf(m.gain_up_dB));
+}
+
+TEST(Margins, OfAnIntegratorFillHalfThePlane) {
+  // |1 + L| = |1 - L| where L is imaginary.
+  EXPECT_NEAR(of([](double w) { return 10.0 / (kJ * w); }).disk, 2.0, 1e-9);
+}
+
+TEST(Margins, TheDiskIsTheNearestApproach) {
+  // L = 1/2 everywhere: 2 (1.5/0.5); L = -1/2: 2 (0.5/1.5).
+  EXPECT_NEAR(of([](double) { return Complex(0.5, 0.0); }).disk, 6.0, 1e-12);
+  EXPECT_NEAR(of([](double w) { return Complex(w > 1.0 ? -0.5 : 0.5, 0.0); }).disk, 2.0 / 3.0, 1e-12);
+}
+
+TEST(Margins, WhatIsSlowDoesNotCount) {
+  const auto integrator = [](double w) { return 10.0 / (kJ * w); };
+  EXPECT_NEAR(of(integrator, 0.0, 9.0).phase_deg, 90.0, 0.01);
+  EXPECT_TRUE(std::isinf(of(integrator, 0.0, 11.0).phase_deg));
+}
+
+TEST(Margins, AroundACentreCountTheDelayFromTheWholeFrequency) {
+  // Crossings at 30 +- 10 rad/s: a quarter turn of lead at 40, three quarters at 20.
+  const Margins m = of([](double w) { return 10.0 / (kJ * (w - 30.0)); }, 30.0);
+  EXPECT_NEAR(m.phase_deg, 90.0, 0.01);
+  EXPECT_NEAR(m.delay_s, kHalfPi / 40.0, 1e-5);
+  const Margins mirrored = of([](double w) { return 10.0 / (kJ * (w + 30.0)); }, -30.0);
+  EXPECT_NEAR(mirrored.delay_s, kHalfPi / 40.0, 1e-5) << "of negative frequencies, too";
+  EXPECT_TRUE(std::isinf(of([](double w) { return 10.0 / (kJ * (w - 30.0)); }, 30.0, 11.0).phase_deg))
+      << "slow is near the centre, too";
+}
+
+TEST(Margins, TheWorseOfTwoIsTheWorseInEach) {
+  const Margins a{6.0, -3.0, 40.0, 0.01, 1.0};
+  const Margins b{5.0, -4.0, 50.0, 0.02, 0.5};
+  for (const Margins& m : {worse(a, b), worse(b, a)}) {
+    EXPECT_EQ(m.gain_up_dB, 5.0);
+    EXPECT_EQ(m.gain_down_dB, -3.0);
+    EXPECT_EQ(m.phase_deg, 40.0);
+    EXPECT_EQ(m.delay_s, 0.01);
+    EXPECT_EQ(m.disk, 0.5);
+  }
+}
+
+}  // namespace
+}  // namespace equipoise

@@ -1,0 +1,269 @@
+"""How fast the simulated loop and its plant run, beside MuJoCo in the same minutes; tools/speed.
+
+CPU time of one core but where said, and the difference of a long and a short run, so that the start is left
+out. Rounds are interleaved; a median stands with its range.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from .count_instructions import ROBOTS
+from .entry import leave
+from .paths import UserError, repository_root
+
+PAGE = Path("docs/speed.md")
+SHORTEST_S, SHORT_S, LONG_S = 0.1, 20, 220
+ENDLESS_S, WARM_S = 36000, 1.0  # of simulation; of running
+TICKS = (2000, 22000)
+TICK_S = 0.005
+STEPS_PER_TICK = 5  # world.step_s: 1 ms
+MUJOCO_STEPS, MUJOCO_EPISODE = 20000, 400  # a robot that is left alone falls; at 0.4 s it starts again
+BATCH, BATCH_TICKS = 16, 1500
+CAMPAIGN = ["--robots", "5", "--fault", "imu_gap_100ms", "encoder_dead", "--phase", "balancing", "driving"]
+
+
+def child(command: list[str], root: Path) -> tuple[float, float]:
+    """CPU seconds, wall seconds."""
+    began = time.monotonic()
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode != 0:
+            said = process.stderr.read().decode(errors="replace") if process.stderr else ""
+            raise UserError(f"{' '.join(command)} failed:\n{said[-2000:]}")
+    return usage.ru_utime + usage.ru_stime, time.monotonic() - began
+
+
+def simulated(root: Path, robot: str, fidelity: str, duration_s: float) -> list[str]:
+    return [
+        str(root / "build/host/equipoise"),
+        *("sim", "--config", ROBOTS[robot], "--fidelity", fidelity, "--log", "off", "--telemetry", "off"),
+        *("--duration-s", str(duration_s), "--yaw-hz", "1" if robot == "mbbr" else "0", "--drive-mps", "0.2"),
+    ]
+
+
+def closed_loop(root: Path, robot: str, fidelity: str) -> float:
+    """Simulated seconds per CPU second: plant at 1 kHz, sensors, the whole firmware at 200 Hz."""
+    long, short = (child(simulated(root, robot, fidelity, t), root)[0] for t in (LONG_S, SHORT_S))
+    return (LONG_S - SHORT_S) / (long - short)
+
+
+def plant(root: Path, fidelity: str) -> float:
+    """Steps of the MBBR's plant per CPU second."""
+    program = str(root / "build/host/tests/bench/instruction_count")
+    command = [program, "mbbr", ROBOTS["mbbr"], f"plant-{fidelity}"]
+    few, many = (child([*command, str(n)], root)[0] for n in TICKS)
+    return STEPS_PER_TICK * (TICKS[1] - TICKS[0]) / (many - few)
+
+
+def mujoco() -> float:
+    """Its steps per CPU second: body and ball with a contact, without motors, bridges and gears."""
+    from .mujoco_client import Robot
+
+    robot = Robot()
+    robot.model.opt.timestep = 0.001
+    began = time.thread_time()
+    for _ in range(MUJOCO_STEPS // MUJOCO_EPISODE):
+        robot.mujoco.mj_resetData(robot.model, robot.data)
+        robot.mujoco.mj_step(robot.model, robot.data, nstep=MUJOCO_EPISODE)
+    return MUJOCO_STEPS / (time.thread_time() - began)
+
+
+def batch(root: Path) -> float:
+    """Simulated seconds of all robots per CPU second, with a policy in Python that does nothing."""
+    import numpy as np
+    from equipoise_robot.envs import BalanceVectorEnv
+
+    env = BalanceVectorEnv(str(root / ROBOTS["mbbr"]), num_envs=BATCH)
+    env.reset(seed=1)
+    actions = np.zeros(env.action_space.shape)
+    began = time.process_time()
+    for _ in range(BATCH_TICKS):
+        env.step(actions)
+    spent = time.process_time() - began
+    env.close()
+    return BATCH * BATCH_TICKS * TICK_S / spent
+
+
+def cores(root: Path) -> float:
+    """Wall time of a campaign on one core over that on two."""
+    command = [str(root / "build/host/equipoise"), "campaign", "--config", ROBOTS["mbbr"], *CAMPAIGN]
+    one, two = (child([*command, "--jobs", n], root)[1] for n in ("1", "2"))
+    return one / two
+
+
+def start_ms(root: Path) -> float:
+    """Wall time of a run of a tenth of a second, start and end included."""
+    return 1e3 * child(simulated(root, "mbbr", "full", SHORTEST_S), root)[1]
+
+
+def memory_MB(root: Path) -> float:
+    """The most that was resident, of the process alone: wait4() counts its parent before exec, too."""
+    command = simulated(root, "mbbr", "full", ENDLESS_S)
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            time.sleep(WARM_S)
+            status = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+        finally:
+            process.kill()
+    found = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.M)
+    if found is None:
+        raise UserError("the simulation ended before its memory was read")
+    return int(found[1]) / 1024.0
+
+
+def filter_code(root: Path, build: str, nm: str) -> dict[str, int] | None:
+    """Bytes of code that a step of the default filter runs through, by robot."""
+    archive = root / build / "libequipoise_core.a"
+    if not archive.is_file():
+        return None
+    said = subprocess.run([nm, "-S", "-C", str(archive)], capture_output=True, text=True, check=True).stdout
+    sizes = {"mbbr": 0, "mip": 0}
+    seen = set()
+    for line in said.splitlines():
+        words = line.split(None, 3)
+        if len(words) < 4 or words[2].upper() not in ("T", "W") or words[3] in seen:
+            continue
+        seen.add(words[3])
+        for robot, states in (("mbbr", 18), ("mip", 14)):
+            steps = tuple(f"{robot.capitalize()}Filter::{f}(" for f in ("predict", "correct", "ahead"))
+            if any(s in words[3] for s in steps) or f"downdate<{states}," in words[3]:
+                sizes[robot] += int(words[1], 16)
+    return sizes
+
+
+def measure(root: Path, rounds: int, say: Callable[[str], None]) -> dict:
+    parts: dict[str, Callable[[], float]] = {
+        f"closed_loop {robot} {fidelity}": lambda r=robot, f=fidelity: closed_loop(root, r, f)
+        for robot in ROBOTS
+        for fidelity in ("nominal", "full")
+    }
+    parts |= {f"plant {f}": lambda f=f: plant(root, f) for f in ("ideal", "full")}
+    parts |= {
+        "mujoco": mujoco,
+        "batch": lambda: batch(root),
+        "cores": lambda: cores(root),
+        "start_ms": lambda: start_ms(root),
+        "memory_MB": lambda: memory_MB(root),
+    }
+    found: dict[str, list[float]] = {name: [] for name in parts}
+    missing: dict[str, str] = {}
+    for k in range(rounds):
+        for name, part in parts.items():
+            if name in missing:
+                continue
+            try:
+                found[name].append(part())
+            except (UserError, ImportError) as problem:
+                missing[name] = str(problem).splitlines()[-1]
+        say(f"round {k + 1} of {rounds}")
+    for f in ("ideal", "full"):
+        ours, theirs = found[f"plant {f}"], found["mujoco"]
+        found[f"plant over mujoco {f}"] = [a / b for a, b in zip(ours, theirs, strict=False)]
+    result: dict = {
+        name: {"median": statistics.median(v), "least": min(v), "most": max(v)} if v else None
+        for name, v in found.items()
+    }
+    return result | {
+        "missing": missing,
+        "rounds": rounds,
+        "load": os.getloadavg()[0],
+        "cores_of_the_machine": os.cpu_count(),
+        "filter_bytes_x86": filter_code(root, "build/host", "nm"),
+        "filter_bytes_cortex_a8": filter_code(root, "build/bbb", "arm-linux-gnueabihf-nm"),
+    }
+
+
+ROWS = [
+    ("closed_loop mbbr nominal", "closed loop, MBBR, `nominal`", "x real time", 0),
+    ("closed_loop mbbr full", "closed loop, MBBR, `full`", "x real time", 0),
+    ("closed_loop mip nominal", "closed loop, eduMIP, `nominal`", "x real time", 0),
+    ("closed_loop mip full", "closed loop, eduMIP, `full`", "x real time", 0),
+    ("batch", f"{BATCH} MBBRs in one Gymnasium call, all together", "x real time", 0),
+    ("plant ideal", "plant alone, `ideal`", "steps/s", -3),
+    ("plant full", "plant alone, `full`", "steps/s", -3),
+    ("mujoco", "MuJoCo, body and ball on the floor", "steps/s", -3),
+    ("plant over mujoco ideal", "plant, `ideal`, over MuJoCo", "x", 2),
+    ("plant over mujoco full", "plant, `full`, over MuJoCo", "x", 2),
+    ("cores", "campaign on two cores over one, wall time", "x", 2),
+    ("start_ms", "start, 0.1 s of simulation, end; wall time", "ms", 0),
+    ("memory_MB", "resident memory of a simulation", "MB", 0),
+]
+
+
+def number(value: float, digits: int) -> str:
+    rounded = round(value, digits)
+    return f"{rounded:,.0f}" if digits <= 0 else f"{rounded:,.{digits}f}"
+
+
+def page(result: dict) -> str:
+    lines = [
+        "# Speed of the simulation",
+        f"Written by `./tools/speed --write`. CPU time of one core but where said; median of "
+        f"{result['rounds']} interleaved rounds, least and most. Load of the machine at the end: "
+        f"{result['load']:.1f} on {result['cores_of_the_machine']} cores. Counts that do not depend on it: "
+        "[performance.md](performance.md).",
+        "",
+        "| | median | least | most | |",
+        "|---|---|---|---|---|",
+    ]
+    for key, label, unit, digits in ROWS:
+        values = result[key]
+        if values is None:
+            reason = result["missing"].get(key, "what it is compared with")
+            lines.append(f"| {label} | not measured: {reason} | | | |")
+            continue
+        cells = " | ".join(number(values[k], digits) for k in ("median", "least", "most"))
+        lines.append(f"| {label} | {cells} | {unit} |")
+    lines += [
+        "",
+        "Closed loop: the plant at 1 kHz, sensors, the whole firmware at 200 Hz, log and telemetry off, "
+        "driving at 0.2 m/s, the MBBR turning at 1 Hz. The plant beside MuJoCo, 1 ms a step: ours rolls "
+        "without slip and has bridges, motors, gears and friction; MuJoCo's has a body and a ball with an "
+        "elliptic contact cone and no drive (tools/equipoise_tools/mujoco_client.py).",
+    ]
+    for key, name in (("filter_bytes_x86", "x86-64"), ("filter_bytes_cortex_a8", "Cortex-A8")):
+        sizes = result[key]
+        text = ", ".join(f"{v / 1024:.1f} KB ({r})" for r, v in sizes.items()) if sizes else "not measured"
+        lines += ["", f"Code of a step of the default filter, {name}: {text}."]
+    lines.append("A Cortex-A8's first-level instruction cache holds 32 KB, its second level 256 KB.")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="tools/speed", description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=5, help="interleaved (default 5)")
+    parser.add_argument("--json", metavar="FILE", help="as JSON; -: to stdout")
+    parser.add_argument("--write", action="store_true", help=str(PAGE))
+    options = parser.parse_args()
+    if options.rounds < 1:
+        parser.error("--rounds: 1 or more")
+    root = repository_root()
+    try:
+        result = measure(root, options.rounds, lambda text: print(text, file=sys.stderr, flush=True))
+    except KeyboardInterrupt:
+        return 130
+    text = page(result)
+    if options.write:
+        (root / PAGE).write_text(text, encoding="utf-8")
+    if options.json == "-":
+        print(json.dumps(result))
+        return 0
+    if options.json:
+        Path(options.json).write_text(json.dumps(result) + "\n", encoding="utf-8")
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    leave(main)
