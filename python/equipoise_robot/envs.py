@@ -46,10 +46,15 @@ class _Robots:
     """What both environments share: the simulated robots, spaces, reward."""
 
     def __init__(
-        self, robot: str | Path, count: int, population: tuple[int, int] | None, asked: dict[str, Any]
+        self,
+        robot: str | Path,
+        count: int,
+        jobs: int,
+        population: tuple[int, int] | None,
+        asked: dict[str, Any],
     ):
         self.request = request(robot, duration_s=_LONGEST_S, **asked)
-        self.episodes = _core.Episodes(self.request, count)
+        self.episodes = _core.Episodes(self.request, count, jobs)
         self.population = population
         self.names = self.episodes.observation_names
         weights = [1.0 / _SCALES[name] if name in _SCALES else 0.0 for name in self.names]
@@ -60,12 +65,14 @@ class _Robots:
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(self.names),), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.episodes.wheels,), np.float64)
 
-    def reset(self, i: int, random: np.random.Generator) -> None:
-        number = None
+    def reset(self, which: list[int], randoms: list[np.random.Generator]) -> None:
+        """Each with the next seed of its own generator, and the next robot where a population is drawn from."""
+        numbers = []
         if self.population is not None:
-            number = int(random.integers(self.population[0], self.population[1], endpoint=True))
-        self.episodes.reset(i, int(random.integers(1 << 63)), number)
-        self.episodes.observation(i, self.observations[i])
+            first, last = self.population
+            numbers = [int(random.integers(first, last, endpoint=True)) for random in randoms]
+        seeds = [int(random.integers(1 << 63)) for random in randoms]
+        self.episodes.reset(which, seeds, numbers, self.observations)
 
     def step(self, actions: Array, active: NDArray[np.bool_]) -> Array:
         """Rewards: 1 for a tick upright, less the squared errors and the drive's."""
@@ -93,7 +100,11 @@ class BalanceEnv(gymnasium.Env[Array, Array]):
         """population: each episode simulates a robot drawn from these numbers, first to last; with fidelity
         "full"."""
         self._robots = _Robots(
-            robot, 1, population, {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set}
+            robot,
+            1,
+            1,
+            population,
+            {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
         )
         self.observation_space = self._robots.observation_space
         self.action_space = self._robots.action_space
@@ -112,7 +123,7 @@ class BalanceEnv(gymnasium.Env[Array, Array]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         super().reset(seed=seed)
-        self._robots.reset(0, self.np_random)
+        self._robots.reset([0], [self.np_random])
         return self._robots.observations[0].copy(), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -138,11 +149,14 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
         fidelity: str = "nominal",
         population: tuple[int, int] | None = None,
         set: dict[str, Any] | tuple[str, ...] = (),
+        jobs: int = 0,
     ) -> None:
+        """jobs: threads that step the robots, 0 for one per core; the results do not depend on it."""
         self.num_envs = num_envs
         self._robots = _Robots(
             robot,
             num_envs,
+            jobs,
             population,
             {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
         )
@@ -156,6 +170,10 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
+    @property
+    def observation_names(self) -> list[str]:
+        return self._robots.names
+
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
@@ -163,7 +181,7 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
         for i, one in zip(self._each, seeds, strict=True):
             if one is not None or i >= len(self._random):
                 self._random[i : i + 1] = [np_random(one)[0]]
-            self._robots.reset(i, self._random[i])
+        self._robots.reset(list(self._each), self._random)
         self._steps[:] = 0
         self._ended[:] = False
         return self._robots.observations.copy(), {}
@@ -171,13 +189,13 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
     def step(
         self, actions: Array
     ) -> tuple[Array, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        again = np.flatnonzero(self._ended)
+        again = np.flatnonzero(self._ended).tolist()
         actions = np.ascontiguousarray(np.clip(actions, -1.0, 1.0), np.float64)
         rewards = self._robots.step(actions, ~self._ended)
         self._steps += 1
-        for i in again:
-            self._robots.reset(int(i), self._random[i])
-            self._steps[i], self._robots.lost[i], rewards[i] = 0, False, 0.0
+        if again:
+            self._robots.reset(again, [self._random[i] for i in again])
+            self._steps[again], self._robots.lost[again], rewards[again] = 0, False, 0.0
         truncated = (self._steps >= self._limit) & ~self._robots.lost
         self._ended = self._robots.lost | truncated
         return self._robots.observations.copy(), rewards, self._robots.lost.copy(), truncated, {}

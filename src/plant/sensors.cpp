@@ -1,6 +1,5 @@
 #include "equipoise/plant/sensors.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 
 namespace equipoise {
@@ -34,6 +33,7 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
   const double turn = world.imu_misalignment_rad.norm();
   R_misaligned_ = misaligned_ ? Eigen::AngleAxisd(turn, world.imu_misalignment_rad / turn).toRotationMatrix()
                               : Mat3::Identity();
+  q_mounted_ = Mat3(R_misaligned_ * calibration.R_BS);
   gyro_bias_ = start.gaussian_vector<3>(world.gyro_bias_sigma_rad_s);
   accel_bias_ = start.gaussian_vector<3>(world.accel_bias_sigma_m_s2);
   attitude_history_.fill(theta_rad);
@@ -114,8 +114,8 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
   raw.battery_counts = counts(m.battery_V - calibration_.battery_offset_V, calibration_.battery_V_per_count);
   const auto delay = static_cast<std::size_t>(world_.attitude_latency_ticks);
   const Vec3 attitude = attitude_history_[(attitude_head_ + kAttitudeDelay - delay) % kAttitudeDelay];
-  const Mat3 R_WB = rotation(quaternion_of(attitude));  // as the chip believes itself to be mounted
-  const Eigen::Quaterniond q((misaligned_ ? Mat3(R_WB * R_misaligned_) : R_WB) * calibration_.R_BS);
+  const auto [w, x, y, z] = quaternion_of(attitude);
+  const Eigen::Quaterniond q = Eigen::Quaterniond(w, x, y, z) * q_mounted_;
   raw.attitude_wxyz[0] = q.w();
   raw.attitude_wxyz[1] = q.x();
   raw.attitude_wxyz[2] = q.y();

@@ -13,6 +13,7 @@
 
 #include "app/cli/errors.hpp"
 #include "app/design/analysis.hpp"
+#include "app/sim/workers.hpp"
 #include "equipoise/config.hpp"
 #include "python/simulation.hpp"
 
@@ -130,14 +131,17 @@ nb::tuple run(app::SimRequest request, const nb::object& controller, const nb::o
   return nb::make_tuple(json, recorder ? nb::object(columns_of(*recorder)) : nb::none());
 }
 
-/// Robots that are stepped together.
+/// Robots that are reset and stepped together, on several threads.
 class Episodes {
  public:
-  Episodes(const app::SimRequest& request, int count)
+  using Flags = nb::ndarray<bool, nb::numpy, nb::ndim<1>>;
+
+  Episodes(const app::SimRequest& request, int count, int jobs)
       : request_(request),
         robot_(simulated(robot_type(request.config))),
         make_((app::check(request), robot_.episodes(request))),
-        episodes_(static_cast<std::size_t>(count)) {}
+        episodes_(static_cast<std::size_t>(count)),
+        workers_(std::min(app::threads_for(jobs), static_cast<unsigned>(std::max(count, 1)))) {}
 
   Episodes(const Episodes&) = delete;
   Episodes& operator=(const Episodes&) = delete;
@@ -145,36 +149,50 @@ class Episodes {
   int count() const { return static_cast<int>(episodes_.size()); }
   const Simulated& robot() const { return robot_; }
 
-  /// `number`: of another one of the population than configured.
-  void reset(int i, std::uint64_t seed, std::optional<std::int64_t> number) {
-    if (number.value_or(request_.robot) != request_.robot) {
-      request_.robot = *number;
-      make_ = robot_.episodes(request_);
-    }
-    at(i) = make_(seed);
+  /// `numbers`, unless empty: of others of the population than configured. Their rows of `observations` are
+  /// written.
+  void reset(const std::vector<int>& which, const std::vector<std::uint64_t>& seeds,
+             const std::vector<std::int64_t>& numbers, const Array& observations) {
+    check(observations, width(), "observations");
+    if (seeds.size() != which.size() || (!numbers.empty() && numbers.size() != which.size()))
+      throw nb::value_error("every episode that is reset has a seed, and a robot or none has");
+    for (const int i : which) (void)at(i);
+    const nb::gil_scoped_release others;
+    workers_.each(static_cast<int>(which.size()), [&](int job) {
+      const auto k = static_cast<std::size_t>(job);
+      at(which[k]) = (numbers.empty() ? make_ : makes(numbers[k]))(seeds[k]);
+      at(which[k])->observation(row(observations, which[k]));
+    });
   }
   /// Those of `active` are stepped; `lost` and their rows of `observations` are written.
-  void step(const Array& actions, const Array& observations, nb::ndarray<bool, nb::numpy, nb::ndim<1>> lost,
-            nb::ndarray<bool, nb::numpy, nb::ndim<1>> active) {
+  void step(const Array& actions, const Array& observations, const Flags& lost, const Flags& active) {
     check(actions, robot_.wheels(), "actions");
     check(observations, width(), "observations");
     if (static_cast<int>(lost.shape(0)) != count() || static_cast<int>(active.shape(0)) != count())
       throw nb::value_error("lost and active have an element per episode");
     const nb::gil_scoped_release others;
-    for (int i = 0; i < count(); ++i) {
-      if (!active(i)) continue;
+    workers_.each(count(), [&](int i) {
+      if (!active(i)) return;
       lost(i) = !at(i)->step(actions.data() + std::ptrdiff_t{i} * robot_.wheels());
-      at(i)->observation(observations.data() + std::ptrdiff_t{i} * width());
-    }
-  }
-  void observation(int i, const Array& out) {
-    if (static_cast<int>(out.size()) != width()) throw nb::value_error("the observation has another length");
-    at(i)->observation(out.data());
+      at(i)->observation(row(observations, i));
+    });
   }
   StateView truth(int i) { return at(i)->truth(); }
 
  private:
-  int width() const { return static_cast<int>(robot_.observation_names().size()); }
+  using Make = std::function<std::unique_ptr<Episode>(std::uint64_t)>;
+
+  Make makes(std::int64_t number) const {
+    if (number == request_.robot) return make_;
+    app::SimRequest request = request_;
+    request.robot = number;
+    app::check(request);
+    return robot_.episodes(request);
+  }
+  int width() const { return width_; }
+  double* row(const Array& observations, int i) const {
+    return observations.data() + std::ptrdiff_t{i} * width();
+  }
   void check(const Array& array, int columns, const char* name) const {
     if (array.ndim() != 2 || static_cast<int>(array.shape(0)) != count() ||
         static_cast<int>(array.shape(1)) != columns)
@@ -189,8 +207,10 @@ class Episodes {
 
   app::SimRequest request_;
   const Simulated& robot_;
-  std::function<std::unique_ptr<Episode>(std::uint64_t)> make_;
+  Make make_;
+  int width_ = static_cast<int>(robot_.observation_names().size());
   std::vector<std::unique_ptr<Episode>> episodes_;
+  app::Workers workers_;  // gone first
 };
 
 /// Raw samples of a log, field by field, as SI.
@@ -340,14 +360,15 @@ NB_MODULE(_core, m) {
         nb::arg("accel"), nb::arg("encoders"), nb::arg("battery"), nb::arg("attitude"),
         "per sample: gyro (3), accelerometer (3), attitude (3), battery, wheel angles");
   nb::class_<Episodes>(m, "Episodes", "Robots that are stepped together.")
-      .def(nb::init<const app::SimRequest&, int>(), nb::arg("request"), nb::arg("count"))
+      .def(nb::init<const app::SimRequest&, int, int>(), nb::arg("request"), nb::arg("count"),
+           nb::arg("jobs"))
       .def_prop_ro("count", &Episodes::count)
       .def_prop_ro("wheels", [](const Episodes& e) { return e.robot().wheels(); })
       .def_prop_ro("observation_names", [](const Episodes& e) { return e.robot().observation_names(); })
-      .def("reset", &Episodes::reset, nb::arg("index"), nb::arg("seed"), nb::arg("robot_number").none())
+      .def("reset", &Episodes::reset, nb::arg("which"), nb::arg("seeds"), nb::arg("robot_numbers"),
+           nb::arg("observations"))
       .def("step", &Episodes::step, nb::arg("actions"), nb::arg("observations"), nb::arg("lost"),
            nb::arg("active"))
-      .def("observation", &Episodes::observation, nb::arg("index"), nb::arg("out"))
       .def("truth", &Episodes::truth, nb::arg("index"));
 }
 

@@ -49,11 +49,12 @@ class SimulatedOf : public Simulated {
   std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const override {
     const auto loaded = app::load_for<Firmware>(&request);
     const Config config = Firmware::apply(loaded.config, request.choice);
-    return [request, config](std::uint64_t seed) mutable {
-      request.seed = seed;
-      return Firmware::with_pipeline(config, request.choice.controller, [&](auto& own) {
+    return [request, config](std::uint64_t seed) {
+      app::SimRequest seeded = request;
+      seeded.seed = seed;
+      return Firmware::with_pipeline(config, seeded.choice.controller, [&](auto& own) {
         using Own = std::decay_t<decltype(own)>;
-        return std::unique_ptr<Episode>(std::make_unique<EpisodeOf<Own>>(config, request, own.params()));
+        return std::unique_ptr<Episode>(std::make_unique<EpisodeOf<Own>>(config, seeded, own.params()));
       });
     };
   }

@@ -259,6 +259,28 @@ def test_vectorised_steps_are_the_single_ones():
         np.testing.assert_array_equal(again[0][i], single.reset()[0])
 
 
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_the_number_of_threads_changes_nothing(jobs):
+    envs_module = pytest.importorskip("equipoise_robot.envs")
+
+    def flown(threads):
+        envs = envs_module.BalanceVectorEnv(
+            "mip", num_envs=5, max_episode_steps=30, fidelity="full", population=(1, 50), jobs=threads
+        )
+        first, _ = envs.reset(seed=9)
+        steps = [envs.step(np.full((5, 2), 0.02))[0] for _ in range(70)]  # each is reset twice
+        return np.array([first, *steps])
+
+    np.testing.assert_array_equal(flown(jobs), flown(2))
+
+
+def test_a_robot_that_cannot_be_drawn_is_named_from_whatever_thread():
+    envs_module = pytest.importorskip("equipoise_robot.envs")
+    envs = envs_module.BalanceVectorEnv("mip", num_envs=4, population=(-9, -9), fidelity="full", jobs=2)
+    with pytest.raises(eq.UserError, match="robot_number"):
+        envs.reset(seed=1)
+
+
 def test_example_that_measures_environments(root, capsys, monkeypatch):
     pytest.importorskip("gymnasium")
     monkeypatch.setattr(sys, "argv", ["environment_speed.py", "1"])

@@ -3,6 +3,7 @@
 // from its own stream. Simulation only; allocates nothing after construction; same seed, same bytes.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 
 #include "equipoise/plant/delay_line.hpp"
@@ -61,6 +62,7 @@ class SimulatedSensors {
   bool aged_;
   DelayLine past_;
   Mat3 R_misaligned_;
+  Eigen::Quaterniond q_mounted_;  // as the chip believes itself to be mounted
   Vec3 attitude_error_ = Vec3::Zero();
   static constexpr std::size_t kAttitudeDelay = 16;
   std::array<Vec3, kAttitudeDelay> attitude_history_{};

@@ -48,31 +48,32 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
       s_(start_state(start_noise_, world.common.initial_tilt_rad)),
-      here_(at(s_)),
+      here_(s_),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)) {}
 
-MbbrWorld::Instant MbbrWorld::moving(const State& s, const MbbrMotion& m, const Turn& heading) noexcept {
-  Instant now;
-  now.motion = m;
-  now.motion.spin_rad_s = s(kSpin);
-  now.heading = heading;
-  now.relative_B = MbbrDynamics::encoder_rate_B(now.motion);
-  return now;
+MbbrWorld::Instant::Instant(const State& s) noexcept
+    : motion(s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot)), heading(s(kTheta + 2)) {
+  turn(s);
 }
 
-MbbrWorld::Instant MbbrWorld::at(const State& s) noexcept {
-  const MbbrMotion m(s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot));
-  return moving(s, m, Turn(s(kTheta + 2)));
+MbbrWorld::Instant::Instant(const Instant& before, const State& s, double by_rad) noexcept
+    : motion(before.motion, s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot)),
+      heading(before.heading.near(s(kTheta + 2), by_rad)) {
+  turn(s);
+}
+
+void MbbrWorld::Instant::turn(const State& s) noexcept {
+  motion.spin_rad_s = s(kSpin);
+  relative_B = MbbrDynamics::encoder_rate_B(motion);
 }
 
 MbbrWorld::Instant MbbrWorld::near(const State& s) const noexcept {
-  const MbbrMotion m(here_.motion, s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot));
-  return moving(s, m, here_.heading.near(s(kTheta + 2), s(kTheta + 2) - s_(kTheta + 2)));
+  return {here_, s, s(kTheta + 2) - s_(kTheta + 2)};
 }
 
 void MbbrWorld::arrive(const State& s) noexcept {
+  here_ = near(s);
   s_ = s;
-  here_ = at(s_);
 }
 
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept {
@@ -161,11 +162,15 @@ Vec3 MbbrWorld::friction_limit_B(const Instant& now) const noexcept {
 
 /// Per axis, the constant torque that would end this step at rest, limited to friction's: sticking and
 /// sliding in one rule.
-Vec3 MbbrWorld::coulomb_torque_B(const State& s, const Instant& free) const noexcept {
+Vec3 MbbrWorld::coulomb_torque_B(const Instant& free) const noexcept {
   if (!world_.common.friction) return Vec3::Zero();
   const double h = world_.common.step_s;
-  const State next = s + h * derivative(free);
-  return uncoupled_coulomb_torque<3>(near(next).relative_B, mobility_, h, friction_limit_B(free));
+  const MbbrMotion& m = free.motion;
+  const Vec3 theta_dot = m.theta_dot();
+  const MbbrMotion next(m, m.theta_xy() + h * theta_dot.head<2>(), m.omega_B + h * free.a.omega_dot_B,
+                        m.phi_dot_star + h * MbbrDynamics::phi_star_ddot(m, free.a, theta_dot.z()));
+  return uncoupled_coulomb_torque<3>(MbbrDynamics::encoder_rate_B(next), mobility_, h,
+                                     friction_limit_B(free));
 }
 
 /// The same where the floor may give way: all axes, the slip and the spin together.
@@ -202,7 +207,7 @@ void MbbrWorld::disturb() {
   s.segment<2>(kPhi) += rotate(s(kTheta + 2), Vec2(v(3), v(4)));
   s.segment<2>(kRelative) += Vec2(v(3) - v(0), v(4) - v(1));
   s(kRelative + 2) -= v(2);
-  arrive(s);
+  s_ = s;
 }
 
 void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a,
@@ -220,7 +225,7 @@ void MbbrWorld::step(double h) noexcept {
   Instant free = here_;
   rolling(&free, push, Vec3::Zero());
   if (!slipping_) {
-    friction_.axes_B = coulomb_torque_B(s_, free);
+    friction_.axes_B = coulomb_torque_B(free);
     const Instant now = with_friction(free, friction_.axes_B);
     slipping_ = floor_.limited() && !floor_.carries(floor_.needed(now.motion, now.loads, now.a));
     if (!slipping_) {
@@ -276,6 +281,7 @@ void MbbrWorld::advance(const MotorCommand& command) {
     time_s_ += kTickS;
   } else {
     disturb();
+    here_ = Instant(s_);  // anew once a tick: what a step adds is exact but for the last digit
   }
   motors_.update_battery(kinematics_.wheels_from_ball(here_.relative_B));
 }
@@ -290,7 +296,7 @@ Felt MbbrWorld::felt_now() const noexcept {
   }
   Instant now = here_;
   rolling(&now, push_now(), Vec3::Zero());
-  if (!held_) now = with_friction(now, coulomb_torque_B(s_, now));
+  if (!held_) now = with_friction(now, coulomb_torque_B(now));
   return felt(now.motion, now.a);
 }
 

@@ -52,18 +52,22 @@ class MbbrWorld {
   using State = Vec<16>;
   /// The forces of one instant and what they do.
   struct Instant {
+    explicit Instant(const State& s) noexcept;                               // motion alone
+    Instant(const Instant& before, const State& s, double by_rad) noexcept;  // within a step from there
+
     MbbrMotion motion;
-    Turn heading{0.0};
+    Turn heading;
     Vec3 relative_B;  // rate of the ball against the body
     Vec3 wheel_torque;
     Vec3 viscous_B;
     MbbrLoads loads;
     MbbrMass mass;
     MbbrAccelerations a;
+
+   private:
+    void turn(const State& s) noexcept;
   };
-  static Instant moving(const State& s, const MbbrMotion& m, const Turn& heading) noexcept;
-  static Instant at(const State& s) noexcept;   // motion alone
-  Instant near(const State& s) const noexcept;  // the same within a step from here
+  Instant near(const State& s) const noexcept;  // within a step from here
   /// Of an instant whose motion is known: forces, and accelerations of a ball that rolls.
   void forces(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
   void rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
@@ -71,7 +75,7 @@ class MbbrWorld {
   State derivative(const Instant& now) const noexcept;
   State slip_derivative(const State& s, const Instant& now, const MbbrSlipAccelerations& a) const noexcept;
   Vec3 friction_limit_B(const Instant& now) const noexcept;
-  Vec3 coulomb_torque_B(const State& s, const Instant& free) const noexcept;
+  Vec3 coulomb_torque_B(const Instant& free) const noexcept;
   MbbrFriction slip_friction(const State& s, const Instant& free, double h) const noexcept;
   Vec2 pull_star(const Instant& now) const noexcept;
   Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }

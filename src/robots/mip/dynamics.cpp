@@ -4,9 +4,10 @@
 
 namespace equipoise {
 
-Vec3 MipDynamics::accelerations(const MipMotion& m, double tau_sum, double tau_difference) const noexcept {
-  const double s = std::sin(m.theta);
-  const double c = std::cos(m.theta);
+Vec3 MipDynamics::accelerations(const MipMotion& m, const Turn& tilt, double tau_sum,
+                                double tau_difference) const noexcept {
+  const double s = tilt.sine();
+  const double c = tilt.cosine();
   const double lm = p_.l * p_.m_b;
   const double wheels = 2.0 * p_.I_w1 + (p_.m_b + 2.0 * p_.m_w) * p_.r * p_.r;
   const double C = p_.I_b2 - p_.I_b3 + 2.0 * (p_.I_w2 - p_.I_w3) + p_.l * lm;

@@ -21,7 +21,12 @@ class MipDynamics {
 
   /// (theta'', phi'', psi'') under the generalised torques of the two motors: `tau_sum` = tau_1 + tau_2 about
   /// the axle, `tau_difference` = tau_1 - tau_2. Wheel angles: phi +- psi d/(2r). (3.17)-(3.18)
-  Vec3 accelerations(const MipMotion& m, double tau_sum, double tau_difference) const noexcept;
+  Vec3 accelerations(const MipMotion& m, double tau_sum, double tau_difference) const noexcept {
+    return accelerations(m, Turn(m.theta), tau_sum, tau_difference);
+  }
+  /// The same where the sine and cosine of theta are known.
+  Vec3 accelerations(const MipMotion& m, const Turn& tilt, double tau_sum,
+                     double tau_difference) const noexcept;
 
   /// The same with linear motors, u_1 = u_x + u_z, u_2 = u_x - u_z. (3.16), (3.18)
   Vec3 accelerations_from_inputs(const MipMotion& m, double u_x, double u_z) const noexcept;

@@ -61,7 +61,11 @@ MipMotion MipWorld::motion(const State& s) noexcept {
   return {s(kTheta), s(kThetaDot), s(kPhiDot), s(kPsiDot)};
 }
 
-Turn MipWorld::heading(const State& s) noexcept { return Turn(s(kPsi)); }
+MipWorld::Facing::Facing(const State& s) noexcept : tilt(s(kTheta)), heading(s(kPsi)) {}
+
+MipWorld::Facing::Facing(const Facing& before, const State& s, const State& from) noexcept
+    : tilt(before.tilt.near(s(kTheta), s(kTheta) - from(kTheta))),
+      heading(before.heading.near(s(kPsi), s(kPsi) - from(kPsi))) {}
 
 Vec2 MipWorld::wheel_rates(const State& s) const noexcept {
   return kinematics_.wheels(s(kPhiDot), s(kPsiDot));
@@ -75,12 +79,13 @@ Vec2 MipWorld::gear_torque(const State& s) const noexcept {
   return tau.cwiseProduct(engaged_);
 }
 
-Vec3 MipWorld::accelerations(const State& s, const Turn& heading, const Vec2& wheel_torque) const noexcept {
+Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept {
   if (lifted()) {  // the body is in a hand, the wheels are in the air
     const Vec2 wheel = wheel_torque / robot_.I_w1;
     return {0.0, kinematics_.phi(wheel), 0.0};
   }
-  Vec3 a = dynamics_.accelerations(motion(s), wheel_torque.sum(), wheel_torque.x() - wheel_torque.y());
+  Vec3 a = dynamics_.accelerations(motion(s), facing.tilt, wheel_torque.sum(),
+                                   wheel_torque.x() - wheel_torque.y());
   const Vec2 push_W = push_force_W(world_.common, time_s_);
   const Vec2& slope = world_.common.floor_slope_rad;
   const double resistance = world_.common.rolling_resistance;
@@ -88,12 +93,12 @@ Vec3 MipWorld::accelerations(const State& s, const Turn& heading, const Vec2& wh
     // Force along the rolling direction at the centre of mass: power F (r (phi' + theta') + l cos theta'),
     // with the axle's speed along -y. On a slope the whole weight pulls the axle downhill.
     const Vec2 weight_W = -(robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2 * slope;
-    const double forward = -heading.back(push_W).y();
+    const double forward = -facing.heading.back(push_W).y();
     const double speed = robot_.r * (s(kPhiDot) + s(kThetaDot));  // along the rolling direction
     const double weight_N = (robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2;
     const double held_back = resistance * weight_N * speed / std::max(std::abs(speed), kRollingStart_m_s);
-    const double downhill = -heading.back(weight_W).y() - held_back;
-    const double c = std::cos(s(kTheta));
+    const double downhill = -facing.heading.back(weight_W).y() - held_back;
+    const double c = facing.tilt.cosine();
     const double lm = robot_.l * robot_.m_b;
     const double m22 = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;
     const double m12 = m22 + lm * robot_.r * c;
@@ -107,20 +112,20 @@ Vec3 MipWorld::accelerations(const State& s, const Turn& heading, const Vec2& wh
   return a;
 }
 
-MipWorld::State MipWorld::derivative(const State& s, const Turn& heading,
+MipWorld::State MipWorld::derivative(const State& s, const Facing& facing,
                                      const Vec3& accelerations) const noexcept {
   State d;
   d.segment<3>(kTheta) = s.segment<3>(kThetaDot);
   d.segment<3>(kThetaDot) = accelerations;
   const double speed = lifted() ? 0.0 : -robot_.r * (s(kPhiDot) + s(kThetaDot));
-  d.segment<2>(kPosition) = heading(Vec2(0.0, speed));
+  d.segment<2>(kPosition) = facing.heading(Vec2(0.0, speed));
   return d;
 }
 
-Vec2 MipWorld::friction_torque(const State& s, const Turn& heading, const Vec2& gear_torque) const noexcept {
+Vec2 MipWorld::friction_torque(const State& s, const Facing& facing, const Vec2& gear_torque) const noexcept {
   if (!world_.common.friction) return Vec2::Zero();
   const double h = world_.common.step_s;
-  const State next = s + h * derivative(s, heading, accelerations(s, heading, gear_torque));
+  const State next = s + h * derivative(s, facing, accelerations(s, facing, gear_torque));
   const Vec2 now = wheel_rates(s);
   const Stiction& stiction = world_.common.stiction;
   Vec2 limit = robot_.mu_c * world_.drivetrain.friction_gain;
@@ -169,12 +174,12 @@ void MipWorld::step(double h) noexcept {
   }
   cross_backlash(h);
   const Vec2 gear = gear_torque(s_);
-  const Turn facing = heading(s_);
+  const Facing facing(s_);
   const Vec2 friction = friction_torque(s_, facing, gear);
   const Vec3 now = accelerations(s_, facing, gear + friction);
   if (sensors_.aged()) sensors_.feel(felt(now));
   s_ = rk4_step(s_, derivative(s_, facing, now), h, [&](const State& s) {
-    const Turn turned = heading(s);
+    const Facing turned(facing, s, s_);
     return derivative(s, turned, accelerations(s, turned, gear_torque(s) + friction));
   });
   time_s_ += h;
@@ -206,7 +211,7 @@ void MipWorld::advance(const MotorCommand& command) {
 
 RawSample MipWorld::sense() {
   const Vec2 gear = gear_torque(s_);
-  const Turn facing = heading(s_);
+  const Facing facing(s_);
   const Felt here = felt(accelerations(s_, facing, gear + friction_torque(s_, facing, gear)));
   TrueMotion m;
   m.time_s = time_s_;

@@ -54,10 +54,16 @@ class MipWorld {
   static MipMotion motion(const State& s) noexcept;
   Vec2 wheel_rates(const State& s) const noexcept;
   Vec2 gear_torque(const State& s) const noexcept;
-  static Turn heading(const State& s) noexcept;  // computed once per evaluation
-  Vec3 accelerations(const State& s, const Turn& heading, const Vec2& wheel_torque) const noexcept;
-  State derivative(const State& s, const Turn& heading, const Vec3& accelerations) const noexcept;
-  Vec2 friction_torque(const State& s, const Turn& heading, const Vec2& gear_torque) const noexcept;
+  /// Sines and cosines of a state, computed once per evaluation.
+  struct Facing {
+    explicit Facing(const State& s) noexcept;
+    Facing(const Facing& before, const State& s, const State& from) noexcept;  // within a step from there
+
+    Turn tilt, heading;
+  };
+  Vec3 accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept;
+  State derivative(const State& s, const Facing& facing, const Vec3& accelerations) const noexcept;
+  Vec2 friction_torque(const State& s, const Facing& facing, const Vec2& gear_torque) const noexcept;
   Felt felt(const Vec3& accelerations) const noexcept;
   void step(double h) noexcept;
   void cross_backlash(double step_s) noexcept;

@@ -1,0 +1,45 @@
+// Threads that are asked again and again: all is done, once, and what goes wrong is said.
+#include "app/sim/workers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+namespace equipoise::app {
+namespace {
+
+TEST(Workers, DoEachOnceRoundAfterRound) {
+  Workers workers(3);
+  std::vector<int> done(7, 0);
+  for (int round = 1; round <= 2000; ++round) {
+    workers.each(7, [&](int i) { ++done[static_cast<std::size_t>(i)]; });
+    ASSERT_EQ(done, std::vector<int>(7, round));
+  }
+  workers.each(0, [](int) { FAIL() << "there is nothing to do"; });
+}
+
+TEST(Workers, ThrowTheFirstFailureAndWorkOn) {
+  Workers workers(2);
+  std::atomic<int> begun{0};
+  const auto fails = [&](int i) {
+    ++begun;
+    if (i == 3) throw std::runtime_error("the third");
+  };
+  EXPECT_THROW(workers.each(100000, fails), std::runtime_error);
+  EXPECT_LT(begun, 100000) << "the rest is not begun";
+  std::atomic<int> sum{0};
+  workers.each(5, [&](int i) { sum += i; });
+  EXPECT_EQ(sum, 10);
+}
+
+TEST(Workers, OneThreadIsTheCallers) {
+  Workers alone(1);
+  const auto here = std::this_thread::get_id();
+  alone.each(5, [&](int) { EXPECT_EQ(std::this_thread::get_id(), here); });
+}
+
+}  // namespace
+}  // namespace equipoise::app
