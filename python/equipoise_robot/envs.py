@@ -66,7 +66,7 @@ class _Robots:
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.episodes.wheels,), np.float64)
 
     def reset(self, which: list[int], randoms: list[np.random.Generator]) -> None:
-        """Each with the next seed of its own generator, and the next robot where a population is drawn from."""
+        """Each with the next seed of its own generator, and the next robot of a population."""
         numbers = []
         if self.population is not None:
             first, last = self.population
