@@ -191,7 +191,7 @@ class Episodes {
   }
   int width() const { return width_; }
   double* row(const Array& observations, int i) const {
-    return observations.data() + std::ptrdiff_t{i} * width();
+    return &observations.data()[std::ptrdiff_t{i} * width()];
   }
   void check(const Array& array, int columns, const char* name) const {
     if (array.ndim() != 2 || static_cast<int>(array.shape(0)) != count() ||
