@@ -93,8 +93,15 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     assert f"| own | {len(told)} | 0 |  |  | not measured | 80 % | not measured |" in page
 
     # A sample for which tests were written is counted apart.
-    learnt, fresh = drawn(OWN, "own", tmp_path, 3, 1), unseen(OWN, "own", tmp_path, 3, 2, [1])
+    learnt, fresh = drawn(OWN, "own", tmp_path, 3, 1), unseen(OWN, "own", tmp_path, 3, 2, [1], 3)
     assert len(fresh) == 1 and not {m for *_, m in learnt} & {m for *_, m in fresh}
+    # A smaller new sample does not let go what the larger ones before had shown.
+    assert unseen(OWN, "own", tmp_path, 1, 2, [1], 3) == fresh
+    assert unseen(OWN, "own", tmp_path, 3, 2, [1]) == []
+    # Of the second sample those count that were drawn without the first one's, and those of a plain draw.
+    seconds = unseen(OWN, "own", tmp_path, 1, 2, [1], 1) + drawn(OWN, "own", tmp_path, 1, 2)
+    third = unseen(OWN, "own", tmp_path, 4, 3, [1, 2], 1)
+    assert third and not {m for *_, m in seconds + learnt[:1]} & {m for *_, m in third}
     page, _ = write_page({"own": told[3:]}, {}, 3, 2, tmp_path, {("own", 1): told[:3]})
     tried = [o.status for *_, o in told[:3] if o.status != "same_code"]
     assert (

@@ -132,6 +132,43 @@ TEST(DriveCoast, BackwardsAtNoLoadSpeedIsAlwaysContinuous) {
   }
 }
 
+TEST(DriveCoast, AWheelFasterThanWithoutLoadIsTakenToBeAsFast) {
+  for (const double T_r : {0.0, 0.289, 10.0}) {
+    const DriveCoastInverse inverse(T_r);
+    for (const double limit : {-1.0, 1.0}) {
+      for (const double beyond : {1.001, 1.5, 3.0}) {
+        for (const double target : {-0.6, -0.01, 0.01, 0.6}) {
+          const DriveCoastSolution at_limit = inverse.solve(limit, target);
+          const DriveCoastSolution faster = inverse.solve(beyond * limit, target);
+          EXPECT_EQ(faster.u, at_limit.u) << T_r << " " << beyond * limit << " " << target;
+          EXPECT_EQ(faster.reachable, at_limit.reachable);
+          EXPECT_EQ(drive_coast_mean_current(T_r, beyond * limit, target),
+                    drive_coast_mean_current(T_r, limit, target));
+        }
+      }
+    }
+  }
+}
+
+/// Where one step is not enough a second one is taken.
+TEST(DriveCoast, ASlowBridgeIsSolvedAsWell) {
+  for (const double T_r : {1.0, 5.0, 40.0}) {
+    const DriveCoastInverse inverse(T_r);
+    int solved = 0;
+    for (double w = -0.98; w < 0.985; w += 0.02) {
+      for (double v = 0.01; v < 1.0; v += 0.01) {
+        const double target = drive_coast_mean_current(T_r, w, v);
+        const DriveCoastSolution solution = inverse.solve(w, target);
+        ASSERT_TRUE(solution.reachable) << T_r << " " << w << " " << v;
+        ASSERT_NEAR(drive_coast_mean_current(T_r, w, solution.u) / target, 1.0, 1e-11)
+            << T_r << " " << w << " " << v;
+        solved += solution.iterations > 0 ? 1 : 0;
+      }
+    }
+    EXPECT_GT(solved, 100) << T_r;
+  }
+}
+
 TEST(DriveCoast, UnreachableTargetsClampAndSaySo) {
   const DriveCoastSolution more = drive_coast_invert(0.289, 0.5, 0.6);  // at most 1 - 0.5
   EXPECT_EQ(more.u, 1.0);

@@ -83,5 +83,24 @@ TEST(Allocate, KeepsBalanceAndGivesYawTheRest) {
   EXPECT_NEAR(full.y(), 0.5, 1e-12);  // no yaw, the direction kept
 }
 
+TEST(Allocate, SharesWithinTheLimitWhateverTheSigns) {
+  const double limit = 0.8;
+  for (const Vec2& balance : {Vec2(0.3, -0.5), Vec2(-0.79, 0.2), Vec2(0.0, 0.0)}) {
+    for (const Vec2& yaw : {Vec2(0.1, -0.1), Vec2(2.0, -2.0), Vec2(-2.0, 2.0), Vec2(-0.4, -3.0)}) {
+      const Vec2 wheels = within<2>(balance, yaw, limit);
+      EXPECT_LE(wheels.cwiseAbs().maxCoeff(), limit + 1e-12) << balance << yaw;
+      const Vec2 added = wheels - balance;
+      EXPECT_NEAR(added.x() * yaw.y(), added.y() * yaw.x(), 1e-12) << "all wheels the same share";
+      EXPECT_GE(added.dot(yaw), 0.0);
+      EXPECT_LE(added.norm(), yaw.norm() + 1e-12);
+      const bool whole = (balance + yaw).cwiseAbs().maxCoeff() <= limit;
+      EXPECT_NEAR(whole ? (added - yaw).norm() : wheels.cwiseAbs().maxCoeff() - limit, 0.0, 1e-12)
+          << "all of it, or up to the limit";
+    }
+  }
+  EXPECT_EQ(within<2>(Vec2(0.8, -0.4), Vec2(0.1, 0.1), limit), Vec2(0.8, -0.4)) << "no room left";
+  EXPECT_EQ(within<2>(Vec2::Zero(), Vec2::Zero(), 0.0), Vec2::Zero());
+}
+
 }  // namespace
 }  // namespace equipoise
