@@ -78,6 +78,8 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     why = {("drivers/limit.c", "if (x > 10) return 10;", "10 → 11"): "nobody asks at 11"}
     page, unexplained = write_page({"own": told}, why, 0, 1, tmp_path)
     assert "nobody asks at 11" in page and not [line for line in unexplained if "10 → 11" in line]
+    survived = sum(outcome.status == "survived" for *_, outcome in told)
+    assert f" | {survived} | 1 | " in page, "survivors, and those with a reason"
 
     # What is kept makes a page without judging; what never was measured is said to be so.
     store = Store(tmp_path / "results.jsonl")
@@ -90,7 +92,7 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     del store.lines[list(store.lines)[-1]]
     assert len(kept(store, sample, "")) < len(told)
     page, _ = write_page({"own": []}, {}, None, 1, tmp_path)
-    assert f"| own | {len(told)} | 0 |  |  | not measured | 80 % | not measured |" in page
+    assert f"| own | {len(told)} | 0 |  |  |  | not measured | 80 % | not measured |" in page
 
     # A sample for which tests were written is counted apart.
     learnt, fresh = drawn(OWN, "own", tmp_path, 3, 1), unseen(OWN, "own", tmp_path, 3, 2, [1], 3)

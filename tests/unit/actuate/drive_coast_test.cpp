@@ -119,6 +119,24 @@ TEST(DriveCoast, MostTargetsOfTheRobotNeedOneStep) {
   EXPECT_LT(steps, 1.2 * solved);
 }
 
+TEST(DriveCoast, AContinuousCurrentIsSolvedWithoutAStep) {
+  const DriveCoastInverse inverse(0.289);
+  int continuous = 0;
+  for (double w = -0.95; w < 0.955; w += 0.05) {
+    for (double v = 0.025; v < 1.0; v += 0.05) {
+      const double linear = 2.0 * v - 1.0 - w;  // (4.29)
+      if (linear <= 0.0 || std::abs(drive_coast_mean_current(0.289, w, v) - linear) > 1e-12) continue;
+      ++continuous;
+      const DriveCoastSolution solution = inverse.solve(w, linear);
+      EXPECT_NEAR(solution.u, v, 1e-12);
+      EXPECT_EQ(solution.iterations, 0);
+      EXPECT_TRUE(solution.reachable);
+    }
+    EXPECT_EQ(inverse.solve(w, 1.01 - w).iterations, 0) << "out of reach";
+  }
+  EXPECT_GT(continuous, 50);
+}
+
 TEST(DriveCoast, LimitsOfVeryHighAndVeryLowPwmFrequency) {
   // (4.35), (4.36)
   EXPECT_NEAR(drive_coast_invert(0.0, 0.3, 0.2).u, (0.2 + 1.0 + 0.3) / 2.0, 1e-12);
@@ -181,11 +199,11 @@ TEST(DriveCoast, UnreachableTargetsClampAndSaySo) {
 
 /// Where the start is good one step is left to do, and it leaves rounding only.
 TEST(DriveCoast, OneStepSolvesAFastBridgeToRounding) {
-  for (const double T_r : {0.05, 0.289}) {
+  for (const double T_r : {0.05, 0.289, 1.0}) {
     const DriveCoastInverse inverse(T_r);
     int solved = 0;
     for (double w = -0.94; w < 0.945; w += 0.02) {
-      for (double r = 0.01; r < 0.35; r += 0.01) {
+      for (double r = 0.01; r < 0.405; r += 0.01) {
         const double target = 0.25 * r * r * (1.0 - w * w) / T_r;
         const DriveCoastSolution solution = inverse.solve(w, target);
         if (solution.iterations == 0) continue;  // continuous there

@@ -47,6 +47,32 @@ TEST(SmoothVelocity, WithoutAJerkLimitIsAPlainSlewWithNothingToFeedForward) {
   EXPECT_NEAR(v.velocity()(0), 1.0, 1e-12);
 }
 
+TEST(SmoothVelocity, FeedsForwardTheChangeOfItsAccelerationAndForgetsAllOnReset) {
+  SmoothVelocity<2> v;
+  v.update(Vec2(0.3, -0.4), kLimits);
+  EXPECT_NEAR(v.jerk().norm(), kLimits.jerk, 1e-9) << "from rest as fast as it may";
+  EXPECT_NEAR(v.jerk().x() / v.jerk().y(), -0.75, 1e-12);
+  EXPECT_NEAR((v.acceleration() - kTickS * v.jerk()).norm(), 0.0, 1e-15);
+  EXPECT_NEAR((v.velocity() - kTickS * v.acceleration()).norm(), 0.0, 1e-15);
+  v.reset();
+  EXPECT_EQ(v.velocity(), Vec2(0.0, 0.0));
+  EXPECT_EQ(v.acceleration(), Vec2(0.0, 0.0));
+  EXPECT_EQ(v.jerk(), Vec2(0.0, 0.0));
+  v.update(Vec2::Zero(), kLimits);
+  EXPECT_EQ(v.velocity(), Vec2(0.0, 0.0)) << "nothing is missing";
+}
+
+TEST(DutyBudget, WithoutRoomForMotionThereIsNone) {
+  DutyBudget b;
+  EXPECT_GE(b.allowed_speed(100.0), 1e9) << "unlimited unless told otherwise";
+  EXPECT_EQ(b.allowed_yaw_rate(-100.0), -100.0);
+  b.share = 0.1;
+  b.of_friction = 0.2;
+  b.per_yaw_rate = b.per_speed = 0.5;
+  EXPECT_EQ(b.allowed_yaw_rate(3.0), 0.0);
+  EXPECT_EQ(b.allowed_speed(0.0), 0.0);
+}
+
 TEST(DutyBudget, TurnsBeforeItTravels) {
   DutyBudget b;
   b.share = 0.6;
