@@ -228,6 +228,20 @@ TEST_F(GuardLoop, ABridgeThatDoesNotSleepIsReported) {
   EXPECT_EQ(finish().error, -ENODEV);
 }
 
+TEST_F(GuardLoop, WhatFailedIsReportedAlsoWhenAllSucceedsAfterIt) {
+  start();
+  bridges_.enable_error = -EIO;
+  page_.want_enable = 1;
+  polls(3, true);
+  bridges_.enable_error = 0;
+  turn_on();
+  page_.want_enable = 0;
+  polls(3, true);
+  EXPECT_FALSE(bridges_.on);
+  turn_on();
+  EXPECT_EQ(finish().error, -EIO);
+}
+
 TEST_F(GuardLoop, AFirstOrLastSleepThatFailsIsReported) {
   bridges_.off_error = -EIO;
   start();
@@ -364,11 +378,10 @@ TEST(Supervisor, AsksTheGuardForTheBridgesOfADrivenTick) {
   supervisor.end(false, 0);
   EXPECT_EQ(page.want_enable, 0U);
   EXPECT_EQ(page.loop, 2U);
-  now_ns += 24'000'000;
-  raw.t_ns = now_ns += 5'000'000;
+  raw.t_ns = now_ns += 30'000'000;
   EXPECT_EQ(supervisor.begin(now_ns, raw) & kGuardDead, 0U);  // silent for no more than 30 ms
   supervisor.end(false, 0);
-  raw.t_ns = now_ns += 2'000'000;
+  raw.t_ns = ++now_ns;
   EXPECT_EQ(supervisor.begin(now_ns, raw) & kGuardDead, kGuardDead);
 }
 
