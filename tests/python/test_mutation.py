@@ -110,6 +110,10 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
         f" | {len(tried) - tried.count('survived')} of {len(tried)} |" in page and "holds | seed 1 |" in page
     )
 
+    # Without their outcomes the page says so, and has no column for them.
+    page, _ = write_page({"own": told[3:]}, {}, 3, 2, tmp_path, {("own", 1): []})
+    assert "not been measured again" in page and "| holds |\n" in page
+
     # Nothing is built or run a second time; on better tests, what survived is.
     judged = []
     judge = Worker.judge

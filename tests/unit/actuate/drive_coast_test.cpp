@@ -137,6 +137,29 @@ TEST(DriveCoast, AContinuousCurrentIsSolvedWithoutAStep) {
   EXPECT_GT(continuous, 50);
 }
 
+/// Where the current just reaches zero at the period's end, on both sides: there the two forms are nearly
+/// one.
+TEST(DriveCoast, BothSidesOfTheBoundaryAreToldApart) {
+  int tried = 0;
+  for (const double T_r : {0.289, 1.0, 2.0, 5.0, 20.0}) {
+    const DriveCoastInverse inverse(T_r);
+    for (double w = -0.95; w < 0.955; w += 0.05) {
+      const double b = 0.5 * (1.0 + w);
+      const double d = 0.5 * (1.0 - w);
+      const double boundary = 1.0 + std::log(b + d * std::exp(-T_r)) / T_r;  // (4.27)
+      for (const double beside : {-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2}) {
+        const double v = boundary + beside;
+        if (v <= 0.0 || v >= 1.0) continue;
+        ++tried;
+        const double current = drive_coast_mean_current(T_r, w, v);
+        EXPECT_NEAR(inverse.solve(w, current).u, v, 1e-11) << T_r << " " << w << " " << beside;
+        EXPECT_NEAR(inverse.solve(-w, -current).u, -v, 1e-11);
+      }
+    }
+  }
+  EXPECT_GT(tried, 1000);
+}
+
 TEST(DriveCoast, LimitsOfVeryHighAndVeryLowPwmFrequency) {
   // (4.35), (4.36)
   EXPECT_NEAR(drive_coast_invert(0.0, 0.3, 0.2).u, (0.2 + 1.0 + 0.3) / 2.0, 1e-12);

@@ -79,7 +79,10 @@ def write_page(
             f"The samples of seed {seeds} showed what the tests lacked, and tests were written for them; "
             "none of their\nmutants is in this one, whose rate is the one that holds or not.\n"
         )
-    page += TABLE.format(more=f" seed {seeds} |" if learnt else "", rule="---|" if learnt else "")
+    beside = any(learnt.values())
+    if learnt and not beside:
+        page += "What became of theirs has not been measured again on today's tests.\n"
+    page += TABLE.format(more=f" seed {seeds} |" if beside else "", rule="---|" if beside else "")
     survivors, unexplained = "", []
     for name, outcomes in measured.items():
         tried, killed = counted(outcomes)
@@ -90,7 +93,7 @@ def write_page(
             for file, text, mutant, outcome in some
         }
         more = ""
-        if learnt:
+        if beside:
             before, noticed = counted(list(seen.values()))
             more = f" {noticed} of {before} |" if before else " not measured |"
         explained = sum(
