@@ -217,6 +217,17 @@ TEST(RunLog, ATickThatLacksAMessageIsCountedAndLeftOut) {
   EXPECT_EQ(log.run().config_toml, "a = 1");
 }
 
+TEST(RunLog, ATickWithAMessageThatCannotBeReadIsLeftOut) {
+  const std::string channel = "EQUIPOISE_MOTORS";
+  std::string other_type = tick_events(1);
+  other_type[other_type.find(channel) + channel.size()] ^= 1;  // the fingerprint of its type
+  RunLog log(run_event() + tick_events(0) + other_type + tick_events(2), "a.lcm");
+  std::vector<std::int64_t> ticks;
+  for (TickRecord tick; log.next(&tick);) ticks.push_back(tick.tick);
+  EXPECT_THAT(ticks, testing::ElementsAre(0, 2));
+  EXPECT_EQ(log.incomplete_ticks(), 1);
+}
+
 TEST(RunLog, DamageBetweenEventsIsSkippedAndCounted) {
   const std::string noise(700000, 'x');  // more than one read
   RunLog log(noise + run_event() + tick_events(0) + noise + tick_events(1) + "\xED\xA1\xDA", "a.lcm");

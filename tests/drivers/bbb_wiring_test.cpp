@@ -5,6 +5,7 @@
 #include "board_fixture.hpp"
 #include "gpio.h"
 #include "monotonic.h"
+#include "support/pin.hpp"
 
 namespace {
 class BbbWiringTest : public BoardFixture {
@@ -20,6 +21,7 @@ class BbbWiringTest : public BoardFixture {
     EXPECT_EQ(bbb_open(&config_, &io_, &error), expected);
     EXPECT_EQ(FakeGpio::instance().heldLines(), 0);
     EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+    EXPECT_EQ(SyscallJournal::instance().strayCloses(), 0) << "of what was never open";
     return error.text;
   }
 };
@@ -78,6 +80,30 @@ TEST_F(BbbWiringTest, OneMotorIsARobotToo) {
   EXPECT_EQ(sample.valid & RIO_ENCODERS, uint32_t{RIO_ENCODERS});
 }
 
+TEST_F(BbbWiringTest, SoManyMotorsAsTheBoundaryHasAreARobotToo) {
+  static_assert(RIO_MAX_MOTORS == 4);
+  const std::string fourth = addCounter("48306180", 3);
+  config_.motors = 4;
+  config_.motor[3] = config_.motor[2];
+  config_.motor[3].in1 = pin_of("481ac000", 20);
+  config_.motor[3].in2 = pin_of("481ac000", 21);
+  config_.motor[3].fault.used = false;
+  config_.motor[3].pwm_channel = 1;
+  snprintf(config_.motor[3].encoder, sizeof config_.motor[3].encoder, "48306180");
+  open();
+  const rio_motors_t command{{0.5, 0.5, 0.5, -0.25}, true};
+  ASSERT_EQ(rio_write_motors(&io_, &command), 0);
+  EXPECT_EQ(attribute(pwm_[1], "pwm1/duty_cycle"), "12500");
+  EXPECT_TRUE(FakeGpio::instance().line("481ac000", 21).active);
+  setAttribute(fourth, "count0/count", "44");
+  EXPECT_EQ(tickAndRead().encoder_counts[3], -44.0) << "reversed in the board file";
+  rio_close(&io_);
+  io_ = {};
+  expectMotorsOff();
+  EXPECT_EQ(attribute(pwm_[1], "pwm1/duty_cycle"), "0");
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+}
+
 TEST_F(BbbWiringTest, ReversedMotorsTurnTheOtherWay) {
   config_.motor[0].motor_reversed = true;
   open();
@@ -131,6 +157,20 @@ TEST_F(BbbWiringTest, EveryTickIsOnePeriodAfterTheLast) {
   const rio_sensors_t sample = tickAndRead();
   EXPECT_EQ(sample.t_ns, edge_ns_);
   EXPECT_EQ(sample.health & RIO_IMU_LATE, 0u) << "back again";
+}
+
+TEST_F(BbbWiringTest, TheFirstTickIsCountedFromTheOpening) {
+  const int64_t before_ns = monotonic_ns();
+  open();
+  const int64_t after_ns = monotonic_ns();
+  rio_sensors_t sample{};
+  ASSERT_EQ(rio_read_sensors(&io_, &sample), 0);
+  EXPECT_GE(sample.t_ns, before_ns);
+  EXPECT_LE(sample.t_ns, after_ns);
+  int64_t now_ns = 0;
+  ASSERT_EQ(rio_wait_tick(&io_, &now_ns), 0);
+  const int64_t limit_ns = 5000000 + 1000000;  // a period, and what an edge may be late
+  EXPECT_EQ(FakeGpio::instance().last_deadline_ns, sample.t_ns + limit_ns);
 }
 
 TEST_F(BbbWiringTest, TicksDoNotQueueBehindAStall) {

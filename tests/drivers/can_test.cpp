@@ -90,6 +90,8 @@ TEST_F(CanTest, RefusesLongFramesAndTornOnes) {
   EXPECT_EQ(can_receive(&port_, &frame), -EBADMSG);
   arrive(frame);
   EXPECT_EQ(can_receive(&port_, &frame), -EBADMSG);
+  ASSERT_EQ(shutdown(bus_, SHUT_WR), 0);
+  EXPECT_EQ(can_receive(&port_, &frame), -EBADMSG) << "nothing at all is no frame";
 }
 
 TEST_F(CanTest, AFrameMayHaveEightBytes) {

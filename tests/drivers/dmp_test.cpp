@@ -3,9 +3,11 @@
 #include <errno.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <random>
+#include <utility>
 
 #include "syscall_journal.hpp"
 #include "testbed.hpp"
@@ -77,6 +79,27 @@ TEST(DmpParse, AcceptsTheNormBandAndNothingOutside) {
     EXPECT_EQ(dmp_parse(bytes.data(), bytes.size(), &packet), -EBADMSG) << norm_squared;
   }
   EXPECT_EQ(packet.attitude_wxyz[0], 42) << "a refused packet must not be written";
+}
+
+/// Of the upper halves alone: a unit is 2^14, and the band is 2^28 +- 2^16. Sums of four squares by Lagrange.
+TEST(DmpParse, TheNormBandHasExactEnds) {
+  const auto parsed = [](std::array<int32_t, 4> upper_wxyz) {
+    std::vector<uint8_t> bytes;
+    int64_t norm_squared = 0;
+    for (const int32_t upper : upper_wxyz) {
+      norm_squared += int64_t{upper} * upper;
+      for (const int shift : {8, 0}) bytes.push_back(static_cast<uint8_t>(upper >> shift));
+      bytes.insert(bytes.end(), {0, 0});
+    }
+    bytes.resize(DMP_PACKET_BYTES, 0);
+    dmp_packet_t packet;
+    return std::make_pair(norm_squared - (int64_t{1} << 28), dmp_parse(bytes.data(), bytes.size(), &packet));
+  };
+  using Parsed = std::pair<int64_t, int>;
+  EXPECT_EQ(parsed({63 * 256, 11 * 256, 2 * 256, 256}), Parsed(-65536, 0));
+  EXPECT_EQ(parsed({16381, 177, 30, 23}), Parsed(-65537, -EBADMSG));
+  EXPECT_EQ(parsed({64 * 256, -256, 0, 0}), Parsed(65536, 0));
+  EXPECT_EQ(parsed({16385, 128, 128, 0}), Parsed(65537, -EBADMSG));
 }
 
 TEST(DmpParse, RefusesOtherLengths) {

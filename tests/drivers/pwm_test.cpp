@@ -3,6 +3,7 @@
 #include <errno.h>
 
 #include <cmath>
+#include <limits>
 
 #include "syscall_journal.hpp"
 #include "testbed.hpp"
@@ -171,6 +172,37 @@ TEST_F(PwmTest, LeavesNoDescriptorOpenWhetherItOpensOrNot) {
   EXPECT_EQ(pwm_.duty_fd, -1);
   EXPECT_EQ(journal.openFiles(), 0);
   EXPECT_EQ(journal.strayCloses(), 0);
+}
+
+TEST_F(PwmTest, WhatFailsAfterItsExportIsUndone) {
+  const SyscallJournal& journal = SyscallJournal::instance();
+  const std::string dir = addPwm("48302200", 4);
+  SyscallJournal::instance().failWrite("pwm0/enable", EIO);  // the last step
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 0, kPeriod_ns), -EIO);
+  EXPECT_EQ(pwm_.duty_fd, -1);
+  EXPECT_EQ(journal.openFiles(), 0);
+  EXPECT_EQ(attribute(dir, "unexport"), "") << "it was there before";
+  removeAttribute(dir, "pwm1");
+  const auto answer = [&] {
+    for (const char* name : {"pwm1/period", "pwm1/duty_cycle", "pwm1/enable"}) setAttribute(dir, name, "0");
+  };
+  SyscallJournal::instance().onWrite("pwmchip4/export", answer);
+  SyscallJournal::instance().failWrite("pwm1/period", EINVAL);
+  EXPECT_EQ(pwm_open(&pwm_, "48302200", 1, kPeriod_ns), -EINVAL);
+  EXPECT_EQ(attribute(dir, "unexport"), "1");
+  EXPECT_EQ(journal.openFiles(), 0);
+  EXPECT_EQ(journal.strayCloses(), 0);
+}
+
+TEST_F(PwmTest, TheWholePeriodAndNothingAreInRange) {
+  const std::string dir = addPwm("48302200", 4);
+  ASSERT_EQ(pwm_open(&pwm_, "48302200", 0, kPeriod_ns), 0);
+  EXPECT_EQ(pwm_set_ns(&pwm_, kPeriod_ns), 0);
+  EXPECT_EQ(attribute(dir, "pwm0/duty_cycle"), "50000");
+  EXPECT_EQ(pwm_set_ns(&pwm_, 0), 0);
+  EXPECT_EQ(attribute(dir, "pwm0/duty_cycle"), "0");
+  for (const double beyond : {std::nextafter(1.0, 2.0), -std::numeric_limits<double>::denorm_min()})
+    EXPECT_EQ(pwm_set_fraction(&pwm_, beyond), -EINVAL) << beyond;
 }
 
 TEST_F(PwmTest, RoundsFractionsToTheNearestNanosecond) {

@@ -59,12 +59,15 @@ TEST_F(SerialTest, PassesEveryByteUnchangedBothWays) {
 }
 
 TEST_F(SerialTest, DescriptorZeroIsOneLikeAnyOther) {
+  SyscallJournal::instance().clear();
   const NoStdin none;
   ASSERT_EQ(serial_open(&serial_, path_.c_str(), 9600), 0);
   EXPECT_EQ(serial_.fd, 0);
   EXPECT_EQ(serial_write(&serial_, reinterpret_cast<const uint8_t*>("x"), 1), 1);
   serial_close(&serial_);
   EXPECT_EQ(serial_.fd, -1);
+  EXPECT_EQ(SyscallJournal::instance().openFiles(), 0);
+  EXPECT_EQ(SyscallJournal::instance().strayCloses(), 0);
 }
 
 TEST_F(SerialTest, KnowsEveryRateThatItOffers) {

@@ -78,6 +78,8 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     why = {("drivers/limit.c", "if (x > 10) return 10;", "10 → 11"): "nobody asks at 11"}
     page, unexplained = write_page({"own": told}, why, 0, 1, tmp_path)
     assert "nobody asks at 11" in page and not [line for line in unexplained if "10 → 11" in line]
+    survived = sum(outcome.status == "survived" for *_, outcome in told)
+    assert f" | {survived} | 1 | " in page, "survivors, and those with a reason"
 
     # What is kept makes a page without judging; what never was measured is said to be so.
     store = Store(tmp_path / "results.jsonl")
@@ -90,16 +92,27 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     del store.lines[list(store.lines)[-1]]
     assert len(kept(store, sample, "")) < len(told)
     page, _ = write_page({"own": []}, {}, None, 1, tmp_path)
-    assert f"| own | {len(told)} | 0 |  |  | not measured | 80 % | not measured |" in page
+    assert f"| own | {len(told)} | 0 |  |  |  | not measured | 80 % | not measured |" in page
 
     # A sample for which tests were written is counted apart.
-    learnt, fresh = drawn(OWN, "own", tmp_path, 3, 1), unseen(OWN, "own", tmp_path, 3, 2, [1])
+    learnt, fresh = drawn(OWN, "own", tmp_path, 3, 1), unseen(OWN, "own", tmp_path, 3, 2, [1], 3)
     assert len(fresh) == 1 and not {m for *_, m in learnt} & {m for *_, m in fresh}
+    # A smaller new sample does not let go what the larger ones before had shown.
+    assert unseen(OWN, "own", tmp_path, 1, 2, [1], 3) == fresh
+    assert unseen(OWN, "own", tmp_path, 3, 2, [1]) == []
+    # Of the second sample those count that were drawn without the first one's, and those of a plain draw.
+    seconds = unseen(OWN, "own", tmp_path, 1, 2, [1], 1) + drawn(OWN, "own", tmp_path, 1, 2)
+    third = unseen(OWN, "own", tmp_path, 4, 3, [1, 2], 1)
+    assert third and not {m for *_, m in seconds + learnt[:1]} & {m for *_, m in third}
     page, _ = write_page({"own": told[3:]}, {}, 3, 2, tmp_path, {("own", 1): told[:3]})
     tried = [o.status for *_, o in told[:3] if o.status != "same_code"]
     assert (
         f" | {len(tried) - tried.count('survived')} of {len(tried)} |" in page and "holds | seed 1 |" in page
     )
+
+    # Without their outcomes the page says so, and has no column for them.
+    page, _ = write_page({"own": told[3:]}, {}, 3, 2, tmp_path, {("own", 1): []})
+    assert "not been measured again" in page and "| holds |\n" in page
 
     # Nothing is built or run a second time; on better tests, what survived is.
     judged = []

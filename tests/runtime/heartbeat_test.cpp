@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <stdexcept>
 #include <string>
 
@@ -26,26 +27,86 @@ std::string complaint(int fd) {
   return "";
 }
 
+constexpr off_t kSize = sizeof(runtime::HeartbeatPage);
+constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
+
+/// Anonymous memory of ours, of zeros.
+int memory(off_t size, int seals) {
+  const int fd = memfd_create("page", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  EXPECT_EQ(fchmod(fd, 0600), 0);
+  EXPECT_EQ(ftruncate(fd, size), 0);
+  EXPECT_EQ(fcntl(fd, F_ADD_SEALS, seals), 0);
+  return fd;
+}
+
+/// How often this process has mapped memory of such a name.
+int mappings(const std::string& name) {
+  std::ifstream maps("/proc/self/maps");
+  int count = 0;
+  for (std::string line; std::getline(maps, line);)
+    count += line.find("/memfd:" + name) != std::string::npos ? 1 : 0;
+  return count;
+}
+
 TEST(SharedHeartbeat, TakesOnlySealedAnonymousPagesOfOurs) {
   const runtime::SharedHeartbeat own;
   EXPECT_EQ(complaint(dup(own.fd())), "");
-  EXPECT_NE(complaint(-1), "");
   EXPECT_NE(complaint(open("/tmp", O_TMPFILE | O_RDWR, 0600)).find("sealed"), std::string::npos);
-  const auto memory = [](off_t size, int seals) {
-    const int fd = memfd_create("page", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-    EXPECT_EQ(fchmod(fd, 0600), 0);
-    EXPECT_EQ(ftruncate(fd, size), 0);
-    EXPECT_EQ(fcntl(fd, F_ADD_SEALS, seals), 0);
-    return fd;
-  };
-  constexpr off_t kSize = sizeof(runtime::HeartbeatPage);
-  constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
-  EXPECT_NE(complaint(memory(kSize, F_SEAL_GROW | F_SEAL_SEAL)).find("sealed"), std::string::npos);
-  EXPECT_NE(complaint(memory(kSize - 1, kSeals)).find("size"), std::string::npos);
   EXPECT_NE(complaint(memory(kSize, kSeals)).find("something else"), std::string::npos);
   const int open_to_all = memory(kSize, kSeals);
   EXPECT_EQ(fchmod(open_to_all, 0666), 0);
   EXPECT_NE(complaint(open_to_all).find("another user"), std::string::npos);
+}
+
+TEST(SharedHeartbeat, AFileWithThePagesContentIsNoPage) {
+  runtime::SharedHeartbeat own;
+  const int file = open("/tmp", O_TMPFILE | O_RDWR, 0600);
+  ASSERT_EQ(write(file, &own.page(), sizeof own.page()), kSize);
+  EXPECT_NE(complaint(file).find("sealed"), std::string::npos);
+}
+
+TEST(SharedHeartbeat, EverySealIsNeededAndTheSizeToTheByte) {
+  for (const int seal : {F_SEAL_SHRINK, F_SEAL_GROW, F_SEAL_SEAL})
+    EXPECT_NE(complaint(memory(kSize, kSeals & ~seal)).find("sealed"), std::string::npos) << seal;
+  for (const off_t size : {off_t{0}, kSize - 1, kSize + 1, 2 * kSize})
+    EXPECT_NE(complaint(memory(size, kSeals)).find("of its size"), std::string::npos) << size;
+}
+
+TEST(SharedHeartbeat, SaysWhyADescriptorIsNone) {
+  EXPECT_EQ(complaint(-1), "heartbeat page: descriptor: Bad file descriptor");
+  const int closed = memory(kSize, kSeals);
+  close(closed);
+  EXPECT_EQ(complaint(closed), "heartbeat page: descriptor: Bad file descriptor");
+}
+
+TEST(SharedHeartbeat, MemoryThatMayNotBeWrittenIsRefusedAndClosed) {
+  const int fd = memory(kSize, kSeals | F_SEAL_WRITE);
+  EXPECT_EQ(complaint(fd), "heartbeat page: cannot be mapped: Operation not permitted");
+  EXPECT_EQ(fcntl(fd, F_GETFD), -1);
+}
+
+TEST(SharedHeartbeat, LeavesNothingMappedWhetherItTakesThePageOrNot) {
+  ASSERT_EQ(mappings("page"), 0);
+  EXPECT_NE(complaint(memory(kSize, kSeals)).find("something else"), std::string::npos);
+  EXPECT_EQ(mappings("page"), 0);
+  const int before = mappings("equipoise-heartbeat");
+  {
+    const runtime::SharedHeartbeat own;
+    EXPECT_EQ(complaint(dup(own.fd())), "");
+    EXPECT_EQ(mappings("equipoise-heartbeat"), before + 1);
+  }
+  EXPECT_EQ(mappings("equipoise-heartbeat"), before);
+}
+
+TEST(SharedHeartbeat, DescriptorZeroIsClosedLikeAnyOtherWhenItIsRefused) {
+  const int kept = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
+  const int refused = memory(kSize - 1, kSeals);
+  ASSERT_EQ(dup2(refused, STDIN_FILENO), STDIN_FILENO);
+  EXPECT_NE(complaint(STDIN_FILENO), "");
+  EXPECT_EQ(fcntl(STDIN_FILENO, F_GETFD), -1);
+  dup2(kept, STDIN_FILENO);
+  close(kept);
+  close(refused);
 }
 
 TEST(SharedHeartbeat, IsOnePageForBothSides) {
@@ -60,7 +121,7 @@ TEST(SharedHeartbeat, IsOnePageForBothSides) {
   EXPECT_EQ(theirs.page().loop, 7U);
   EXPECT_EQ(own.page().guard, 8U);
   EXPECT_NE(fcntl(own.fd(), F_GETFD) & FD_CLOEXEC, 0) << "no other program inherits it";
-  EXPECT_EQ(fcntl(own.fd(), F_GET_SEALS), F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL);
+  EXPECT_EQ(fcntl(own.fd(), F_GET_SEALS), kSeals);
 }
 
 TEST(SharedHeartbeat, ClosesItsDescriptorAlsoWhenItRefusesIt) {
@@ -100,6 +161,16 @@ TEST(SharedHeartbeat, AMachineWithoutRoomIsAnErrorText) {
     text = error.what();
   }
   EXPECT_NE(text.find("no memory for it"), std::string::npos) << text;
+}
+
+TEST(SupervisorTest, WhereNothingIsWatchedNothingForbidsMotors) {
+  runtime::Supervisor supervisor(runtime::Watched{});
+  RawSample raw{};
+  for (int tick = 1; tick <= 3; ++tick) {
+    raw.t_ns = tick * kTick_ns;
+    EXPECT_EQ(supervisor.begin(raw.t_ns, raw), 0U);
+    supervisor.end(true, 0);
+  }
 }
 
 TEST(SupervisorTest, ADeadGuardForbidsMotors) {

@@ -119,6 +119,47 @@ TEST(DriveCoast, MostTargetsOfTheRobotNeedOneStep) {
   EXPECT_LT(steps, 1.2 * solved);
 }
 
+TEST(DriveCoast, AContinuousCurrentIsSolvedWithoutAStep) {
+  const DriveCoastInverse inverse(0.289);
+  int continuous = 0;
+  for (double w = -0.95; w < 0.955; w += 0.05) {
+    for (double v = 0.025; v < 1.0; v += 0.05) {
+      const double linear = 2.0 * v - 1.0 - w;  // (4.29)
+      if (linear <= 0.0 || std::abs(drive_coast_mean_current(0.289, w, v) - linear) > 1e-12) continue;
+      ++continuous;
+      const DriveCoastSolution solution = inverse.solve(w, linear);
+      EXPECT_NEAR(solution.u, v, 1e-12);
+      EXPECT_EQ(solution.iterations, 0);
+      EXPECT_TRUE(solution.reachable);
+    }
+    EXPECT_EQ(inverse.solve(w, 1.01 - w).iterations, 0) << "out of reach";
+  }
+  EXPECT_GT(continuous, 50);
+}
+
+/// Where the current just reaches zero at the period's end, on both sides: there the two forms are nearly
+/// one.
+TEST(DriveCoast, BothSidesOfTheBoundaryAreToldApart) {
+  int tried = 0;
+  for (const double T_r : {0.289, 1.0, 2.0, 5.0, 20.0}) {
+    const DriveCoastInverse inverse(T_r);
+    for (double w = -0.95; w < 0.955; w += 0.05) {
+      const double b = 0.5 * (1.0 + w);
+      const double d = 0.5 * (1.0 - w);
+      const double boundary = 1.0 + std::log(b + d * std::exp(-T_r)) / T_r;  // (4.27)
+      for (const double beside : {-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2}) {
+        const double v = boundary + beside;
+        if (v <= 0.0 || v >= 1.0) continue;
+        ++tried;
+        const double current = drive_coast_mean_current(T_r, w, v);
+        EXPECT_NEAR(inverse.solve(w, current).u, v, 1e-11) << T_r << " " << w << " " << beside;
+        EXPECT_NEAR(inverse.solve(-w, -current).u, -v, 1e-11);
+      }
+    }
+  }
+  EXPECT_GT(tried, 1000);
+}
+
 TEST(DriveCoast, LimitsOfVeryHighAndVeryLowPwmFrequency) {
   // (4.35), (4.36)
   EXPECT_NEAR(drive_coast_invert(0.0, 0.3, 0.2).u, (0.2 + 1.0 + 0.3) / 2.0, 1e-12);
@@ -129,6 +170,43 @@ TEST(DriveCoast, LimitsOfVeryHighAndVeryLowPwmFrequency) {
 TEST(DriveCoast, BackwardsAtNoLoadSpeedIsAlwaysContinuous) {
   for (const double T_r : {0.289, 600.0, 1e6}) {
     EXPECT_DOUBLE_EQ(drive_coast_mean_current(T_r, -1.0, 0.3), 0.6);  // (4.29) with omega_s = -1
+  }
+}
+
+TEST(DriveCoast, AWheelFasterThanWithoutLoadIsTakenToBeAsFast) {
+  for (const double T_r : {0.0, 0.289, 10.0}) {
+    const DriveCoastInverse inverse(T_r);
+    for (const double limit : {-1.0, 1.0}) {
+      for (const double beyond : {1.001, 1.5, 3.0}) {
+        for (const double target : {-0.6, -0.01, 0.01, 0.6}) {
+          const DriveCoastSolution at_limit = inverse.solve(limit, target);
+          const DriveCoastSolution faster = inverse.solve(beyond * limit, target);
+          EXPECT_EQ(faster.u, at_limit.u) << T_r << " " << beyond * limit << " " << target;
+          EXPECT_EQ(faster.reachable, at_limit.reachable);
+          EXPECT_EQ(drive_coast_mean_current(T_r, beyond * limit, target),
+                    drive_coast_mean_current(T_r, limit, target));
+        }
+      }
+    }
+  }
+}
+
+/// Where one step is not enough a second one is taken.
+TEST(DriveCoast, ASlowBridgeIsSolvedAsWell) {
+  for (const double T_r : {1.0, 5.0, 40.0}) {
+    const DriveCoastInverse inverse(T_r);
+    int solved = 0;
+    for (double w = -0.98; w < 0.985; w += 0.02) {
+      for (double v = 0.01; v < 1.0; v += 0.01) {
+        const double target = drive_coast_mean_current(T_r, w, v);
+        const DriveCoastSolution solution = inverse.solve(w, target);
+        ASSERT_TRUE(solution.reachable) << T_r << " " << w << " " << v;
+        ASSERT_NEAR(drive_coast_mean_current(T_r, w, solution.u) / target, 1.0, 1e-11)
+            << T_r << " " << w << " " << v;
+        solved += solution.iterations > 0 ? 1 : 0;
+      }
+    }
+    EXPECT_GT(solved, 100) << T_r;
   }
 }
 
@@ -144,11 +222,11 @@ TEST(DriveCoast, UnreachableTargetsClampAndSaySo) {
 
 /// Where the start is good one step is left to do, and it leaves rounding only.
 TEST(DriveCoast, OneStepSolvesAFastBridgeToRounding) {
-  for (const double T_r : {0.05, 0.289}) {
+  for (const double T_r : {0.05, 0.289, 1.0}) {
     const DriveCoastInverse inverse(T_r);
     int solved = 0;
     for (double w = -0.94; w < 0.945; w += 0.02) {
-      for (double r = 0.01; r < 0.35; r += 0.01) {
+      for (double r = 0.01; r < 0.405; r += 0.01) {
         const double target = 0.25 * r * r * (1.0 - w * w) / T_r;
         const DriveCoastSolution solution = inverse.solve(w, target);
         if (solution.iterations == 0) continue;  // continuous there

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <random>
 #include <string>
 
 namespace equipoise {
@@ -79,7 +80,44 @@ TEST(EncoderCheck, AWheelThatMovesAHundredthOfARadianIsNotStuck) {
         [tick, travel_rad](Vec<kWheels>& angle) mutable { angle(0) = tick++ % 2 == 0 ? 0.0 : travel_rad; });
   };
   EXPECT_EQ(moving(0.0099).faults.stuck, 1U);
+  EXPECT_EQ(moving(0.01).faults.stuck, 0U);
   EXPECT_EQ(moving(0.0101).faults.stuck, 0U);
+}
+
+TEST(EncoderCheck, TheSizeOfTheAnswerDecidesNothing) {
+  for (const double size : {0.1, 1.0, 100.0}) {
+    EXPECT_EQ(shake([size](Vec<kWheels>& angle) { angle *= size; }).faults.reversed, 0U) << size;
+    EXPECT_EQ(shake([size](Vec<kWheels>& angle) { angle *= -size; }).faults.reversed, 7U) << size;
+  }
+}
+
+TEST(EncoderCheck, NoiseWithoutAnAnswerIsNotAReversedWheel) {
+  constexpr int kStarts = 400;
+  for (const double drive : {0.1, 0.3, 1.0}) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> noise(-1.0, 1.0);
+    int named = 0;
+    for (int start = 0; start < kStarts; ++start) {
+      const Shaken shaken = shake([&](Vec<kWheels>& angle) { angle(0) = noise(random); }, drive);
+      named += shaken.faults.reversed != 0 ? 1 : 0;
+    }
+    EXPECT_LT(named, kStarts / 25) << "correlated below -0.6 by chance, at " << drive;
+  }
+}
+
+/// The verdict needs all of the window: wherever a reading is wild, nothing is left to tell.
+TEST(EncoderCheck, EveryReadingOfTheWindowWeighs) {
+  for (int wild = 0; wild < Check::kWindow; ++wild) {
+    for (const double jump_rad : {-100.0, 100.0}) {
+      int call = 0;
+      const Shaken shaken = shake([&](Vec<kWheels>& angle) {
+        angle(0) *= -1.0;
+        if (call++ == 1 + wild) angle(0) += jump_rad;  // a window begins with the second call
+      });
+      EXPECT_EQ(shaken.faults.reversed, 0U) << wild;
+      EXPECT_EQ(shaken.faults.stuck, 0U) << wild;
+    }
+  }
 }
 
 /// A large cubic is what balancing does meanwhile: it decides nothing.

@@ -47,6 +47,32 @@ TEST(SmoothVelocity, WithoutAJerkLimitIsAPlainSlewWithNothingToFeedForward) {
   EXPECT_NEAR(v.velocity()(0), 1.0, 1e-12);
 }
 
+TEST(SmoothVelocity, FeedsForwardTheChangeOfItsAccelerationAndForgetsAllOnReset) {
+  SmoothVelocity<2> v;
+  v.update(Vec2(0.3, -0.4), kLimits);
+  EXPECT_NEAR(v.jerk().norm(), kLimits.jerk, 1e-9) << "from rest as fast as it may";
+  EXPECT_NEAR(v.jerk().x() / v.jerk().y(), -0.75, 1e-12);
+  EXPECT_NEAR((v.acceleration() - kTickS * v.jerk()).norm(), 0.0, 1e-15);
+  EXPECT_NEAR((v.velocity() - kTickS * v.acceleration()).norm(), 0.0, 1e-15);
+  v.reset();
+  EXPECT_EQ(v.velocity(), Vec2(0.0, 0.0));
+  EXPECT_EQ(v.acceleration(), Vec2(0.0, 0.0));
+  EXPECT_EQ(v.jerk(), Vec2(0.0, 0.0));
+  v.update(Vec2::Zero(), kLimits);
+  EXPECT_EQ(v.velocity(), Vec2(0.0, 0.0)) << "nothing is missing";
+}
+
+TEST(DutyBudget, WithoutRoomForMotionThereIsNone) {
+  DutyBudget b;
+  EXPECT_GE(b.allowed_speed(100.0), 1e9) << "unlimited unless told otherwise";
+  EXPECT_EQ(b.allowed_yaw_rate(-100.0), -100.0);
+  b.share = 0.1;
+  b.of_friction = 0.2;
+  b.per_yaw_rate = b.per_speed = 0.5;
+  EXPECT_EQ(b.allowed_yaw_rate(3.0), 0.0);
+  EXPECT_EQ(b.allowed_speed(0.0), 0.0);
+}
+
 TEST(DutyBudget, TurnsBeforeItTravels) {
   DutyBudget b;
   b.share = 0.6;
@@ -81,6 +107,25 @@ TEST(Allocate, KeepsBalanceAndGivesYawTheRest) {
   const Vec2 full = within<2>(Vec2(1.6, 0.8), Vec2(0.6, -0.6), 1.0);
   EXPECT_NEAR(full.x(), 1.0, 1e-12);
   EXPECT_NEAR(full.y(), 0.5, 1e-12);  // no yaw, the direction kept
+}
+
+TEST(Allocate, SharesWithinTheLimitWhateverTheSigns) {
+  const double limit = 0.8;
+  for (const Vec2& balance : {Vec2(0.3, -0.5), Vec2(-0.79, 0.2), Vec2(0.0, 0.0)}) {
+    for (const Vec2& yaw : {Vec2(0.1, -0.1), Vec2(2.0, -2.0), Vec2(-2.0, 2.0), Vec2(-0.4, -3.0)}) {
+      const Vec2 wheels = within<2>(balance, yaw, limit);
+      EXPECT_LE(wheels.cwiseAbs().maxCoeff(), limit + 1e-12) << balance << yaw;
+      const Vec2 added = wheels - balance;
+      EXPECT_NEAR(added.x() * yaw.y(), added.y() * yaw.x(), 1e-12) << "all wheels the same share";
+      EXPECT_GE(added.dot(yaw), 0.0);
+      EXPECT_LE(added.norm(), yaw.norm() + 1e-12);
+      const bool whole = (balance + yaw).cwiseAbs().maxCoeff() <= limit;
+      EXPECT_NEAR(whole ? (added - yaw).norm() : wheels.cwiseAbs().maxCoeff() - limit, 0.0, 1e-12)
+          << "all of it, or up to the limit";
+    }
+  }
+  EXPECT_EQ(within<2>(Vec2(0.8, -0.4), Vec2(0.1, 0.1), limit), Vec2(0.8, -0.4)) << "no room left";
+  EXPECT_EQ(within<2>(Vec2::Zero(), Vec2::Zero(), 0.0), Vec2::Zero());
 }
 
 }  // namespace

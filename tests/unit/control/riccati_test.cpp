@@ -4,6 +4,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
 
 #include "equipoise/control/margins.hpp"
 
@@ -36,6 +38,38 @@ TEST(Riccati, ScalarHasTheClosedForm) {
   EXPECT_NEAR(X(0, 0).real(), 2.0 + std::sqrt(5.0), 1e-13);
 }
 
+TEST(Riccati, WithoutAnInputIsTheCostOfWaiting) {
+  // x = x/2, q = 1: X = X/4 + 1.
+  const CMatrix one = CMatrix::Ones(1, 1);
+  EXPECT_NEAR(riccati(0.5 * one, 0.0 * one, one, one)(0, 0).real(), 4.0 / 3.0, 1e-14);
+}
+
+TEST(Hold, IsExactWhereTheMotionHasAClosedForm) {
+  for (const double t : {0.005, 0.3, 40.0}) {
+    const Hold falling = hold(CMatrix{{0.0, 1.0}, {0.0, 0.0}}, CMatrix{{0.0}, {2.0}}, t);
+    EXPECT_LT((falling.A - CMatrix{{1.0, t}, {0.0, 1.0}}).norm(), 1e-13 * t + 1e-15) << t;
+    EXPECT_LT((falling.B - CMatrix{{t * t}, {2.0 * t}}).norm(), 1e-13 * (t + t * t)) << t;
+  }
+  for (const double rate :
+       {-0.499, -0.501, -1.0, -30.0, 3.0}) {  // decays and grows, with and without squarings
+    const Hold decay = hold(CMatrix::Constant(1, 1, rate), CMatrix::Ones(1, 1), 1.0);
+    EXPECT_NEAR(decay.A(0, 0).real() / std::exp(rate), 1.0, 1e-13) << rate;
+    EXPECT_NEAR(decay.B(0, 0).real() / (std::expm1(rate) / rate), 1.0, 1e-13) << rate;
+  }
+  const Hold turn = hold(CMatrix::Constant(1, 1, Complex(0.0, 7.0)), CMatrix::Ones(1, 1), 0.5);
+  EXPECT_LT(std::abs(turn.A(0, 0) - std::polar(1.0, 3.5)), 1e-14);
+  EXPECT_LT(std::abs(turn.B(0, 0) - (std::polar(1.0, 3.5) - 1.0) / Complex(0.0, 7.0)), 1e-14);
+}
+
+TEST(Sampled, ALateInputOfAMovingPlantIsCarriedOn) {
+  // x' = rate x + u: exp(rate period), and the two parts of the integral of exp(rate s).
+  const double rate = 40.0;
+  const SampledSystem s = sampled(CMatrix::Constant(1, 1, rate), CMatrix::Constant(1, 1, 3.0), 0.01, 0.004);
+  EXPECT_NEAR(s.A(0, 0).real(), std::exp(rate * 0.01), 1e-14);
+  EXPECT_NEAR(s.B(0, 0).real(), 3.0 * std::expm1(rate * 0.006) / rate, 1e-15);
+  EXPECT_NEAR(s.B_late(0, 0).real(), 3.0 * (std::exp(rate * 0.01) - std::exp(rate * 0.006)) / rate, 1e-15);
+}
+
 TEST(Sampled, LateInputActsUnderTheOldValueFirst) {
   // x' = u: half of the period each.
   const SampledSystem s = sampled(CMatrix::Zero(1, 1), CMatrix::Ones(1, 1), 0.01, 0.004);
@@ -57,6 +91,24 @@ TEST(Lqr, GainOnTheInputBeforeStandsForTheDelay) {
   EXPECT_LT(std::abs(K_late(0, 2) - (K.leftCols(2) * B)(0, 0)), 1e-12);
   EXPECT_LT(largest_pole(late, K_late), 1.0);
   EXPECT_GT(largest_pole(prompt, CMatrix::Zero(1, 3)), 1.0);
+}
+
+TEST(Lqr, WeighsEveryStateAndEveryInputByItsOwn) {
+  // Two integrators beside each other, x = x + u: X^2 - q X - q r = 0 and K = X/(r + X), each with its
+  // weights.
+  const SampledSystem beside{CMatrix::Identity(2, 2), CMatrix::Identity(2, 2), CMatrix::Zero(2, 2)};
+  const Eigen::Vector2d q(1.0, 9.0);
+  const Eigen::Vector2d r(4.0, 0.25);
+  const CMatrix K = lqr(beside, q, r);
+  for (int i = 0; i < 2; ++i) {
+    const double X = 0.5 * (q(i) + std::sqrt(q(i) * q(i) + 4.0 * q(i) * r(i)));
+    EXPECT_NEAR(K(i, i).real(), X / (r(i) + X), 1e-13);
+    EXPECT_NEAR(std::abs(K(i, 1 - i)), 0.0, 1e-13);
+  }
+  const double slowest = std::max(1.0 - K(0, 0).real(), 1.0 - K(1, 1).real());
+  EXPECT_NEAR(largest_pole(beside, K), slowest, 1e-12);
+  EXPECT_EQ(closed_loop_poles(beside, K).size(), 4) << "two states and two inputs before";
+  EXPECT_TRUE(std::isinf(largest_pole(beside, CMatrix::Constant(2, 4, std::nan("")))));
 }
 
 TEST(Margins, OfAnIntegratorWithDelay) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <vector>
@@ -224,6 +226,62 @@ TEST(CommandNameFields, HoldNamesOfEveryAllowedLength) {
   EXPECT_EQ(name_in(field), "");
 }
 
+/// docs/commands.md by another implementation: Python's hashlib.blake2b over what LCM's Python encodes.
+TEST(Proofs, AreKeyedBlake2bOfTheNameAndTheMessage) {
+  const CommandKeys keys = keys_of(1);  // a one and 31 zeros
+  signed_command_t command{};
+  command.session = 0x0102030405060708;
+  command.heard_ms = 1000;
+  command.sender = 7;
+  command.sequence = 1;
+  command.turn = 3;
+  command.action = kDrive;
+  command.velocity_W_m_s[0] = 0.25;
+  command.velocity_W_m_s[1] = -0.5;
+  command.yaw_rate_rad_s = -1.5;
+  set_name("anna", &command.holder);
+  command.mac[3] = 77;  // has no say
+  sign(keys, "mbbr", &command);
+  const std::uint8_t command_proof[] = {0xd0, 0x84, 0x39, 0xc9, 0x9c, 0x5f, 0x87, 0x13,
+                                        0x5a, 0x68, 0x92, 0xd5, 0x00, 0x4a, 0xf6, 0xff};
+  EXPECT_TRUE(std::equal(std::begin(command.mac), std::end(command.mac), std::begin(command_proof)));
+  EXPECT_TRUE(authentic(keys, "mbbr", command));
+
+  command_session_t announcement{};
+  set_name("mbbr", &announcement.robot);
+  announcement.session = command.session;
+  announcement.clock_ms = 1000;
+  announcement.turn = 3;
+  announcement.turn_sender = 7;
+  announcement.turn_sequence = 9;
+  set_name("anna", &announcement.turn_holder);
+  announcement.state = command_session_t::ARMED;
+  announcement.to = 7;
+  announcement.sequence = 9;
+  announcement.accepted = 4;
+  announcement.refused = 5;
+  sign(keys, &announcement);
+  const std::uint8_t proof[] = {0xe5, 0xa8, 0xa9, 0x06, 0x72, 0x04, 0x37, 0x42,
+                                0x65, 0x1d, 0x81, 0xef, 0x2e, 0xe1, 0x48, 0xbd};
+  EXPECT_TRUE(std::equal(std::begin(announcement.mac), std::end(announcement.mac), std::begin(proof)));
+  EXPECT_TRUE(authentic(keys, announcement));
+}
+
+TEST(Proofs, OfOneBitLessAreNone) {
+  const CommandKeys keys = keys_of(1);
+  signed_command_t command{};
+  set_name("anna", &command.holder);
+  sign(keys, "mbbr", &command);
+  for (std::uint8_t& byte : command.mac) {
+    for (int bit = 0; bit < 8; ++bit) {
+      byte ^= static_cast<std::uint8_t>(1U << bit);
+      EXPECT_FALSE(authentic(keys, "mbbr", command));
+      byte ^= static_cast<std::uint8_t>(1U << bit);
+    }
+  }
+  EXPECT_TRUE(authentic(keys, "mbbr", command));
+}
+
 TEST_F(Gate, SaysWhoBeganTheTurn) {
   take({9, kArm});
   const command_session_t said = gate_.announcement(1000, 0);
@@ -249,6 +307,15 @@ TEST_F(Gate, ASendersPlaceIsFreeWhenNothingItSignedCanCount) {
   EXPECT_EQ(take({1, kDrive, 1000, 0, 1}, 1501), Verdict::kRefused);
   EXPECT_EQ(take({2, kDrive, 1400, 0, 3}, 1501), Verdict::kRefused);
   EXPECT_EQ(take({3, kDrive, 1399, 0, 3}, 1501), Verdict::kRefused);  // answers an older one than its last
+}
+
+TEST_F(Gate, ASenderIsForgottenOnlyWhenItsLastWordIsTooOld) {
+  for (std::int64_t id = 1; id <= 8; ++id) EXPECT_EQ(take({1, kDrive, 1000, 0, id}), Verdict::kObeyed);
+  EXPECT_EQ(take({1, kDrive, 1500, 0, 9}, 1000 + kTimeout_ms), Verdict::kRefused) << "it may still count";
+  EXPECT_EQ(take({1, kDrive, 1501, 0, 9}, 1001 + kTimeout_ms), Verdict::kObeyed);
+  EXPECT_EQ(gate_.announcement(1501, 0, 9).sequence, 1);
+  EXPECT_EQ(gate_.announcement(1501, 0, 1).sequence, 0) << "forgotten";
+  EXPECT_EQ(gate_.announcement(1501, 0, 0).sequence, 0) << "to nobody";
 }
 
 TEST_F(Gate, EverySessionIsAnother) {

@@ -1,9 +1,11 @@
 // A sender believes only a robot that has answered it, and follows only what is new.
 #include "equipoise/runtime/command_sender.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
+#include <vector>
 
 #include "command_fixture.hpp"
 
@@ -84,6 +86,19 @@ TEST_F(Sender, FindsItsRobotAmongRecordingsOfAHundredEarlierStarts) {
   }
   meet(1000);
   EXPECT_EQ(sender_.links().size(), 1U);
+}
+
+TEST_F(Sender, OfTooManyStartsItForgetsThoseHeardFirst) {
+  std::vector<std::int64_t> heard;
+  for (int i = 0; i < 70; ++i) {
+    const CommandGate start(keys_, 500);
+    heard.push_back(start.announcement(1000, 0).session);
+    sender_.hear(start.announcement(1000, 0));
+  }
+  std::vector<std::int64_t> asked;
+  while (const auto question = sender_.ask()) asked.push_back(question->session);
+  heard.erase(heard.begin(), heard.begin() + 6);
+  EXPECT_THAT(asked, ::testing::UnorderedElementsAreArray(heard)) << "the last 64";
 }
 
 TEST_F(Sender, SeesTwoRobotsWithOneNameAndKey) {

@@ -211,6 +211,21 @@ TEST_F(LogWriterTest, LeavesNoDescriptorOpen) {
   close(after);
 }
 
+TEST_F(LogWriterTest, DescriptorZeroIsOneLikeAnyOther) {
+  write("run.lcm", "of an earlier run");
+  const int kept = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
+  close(STDIN_FILENO);
+  LogWriter log;
+  EXPECT_TRUE(log.open(path_, {})) << log.error();
+  write_tick(&log);
+  log.close();
+  EXPECT_EQ(log.error(), "");
+  EXPECT_EQ(fcntl(STDIN_FILENO, F_GETFD), -1) << "neither the earlier log nor this one holds it";
+  dup2(kept, STDIN_FILENO);
+  close(kept);
+  EXPECT_EQ(fs::file_size(path_), 200U);
+}
+
 TEST_F(LogWriterTest, APreambleStartsEveryFile) {
   LogWriter log;
   LogLimits limits;
@@ -218,6 +233,7 @@ TEST_F(LogWriterTest, APreambleStartsEveryFile) {
   limits.sync = true;
   ASSERT_TRUE(log.open(path_, limits));
   log.preamble(7, "RUN", {1, 2, 3});
+  EXPECT_EQ(fs::file_size(path_), 34U) << "at once: a run that never ticks has one";
   for (int tick = 0; tick < 5; ++tick) write_tick(&log);
   log.close();
   ASSERT_EQ(existing_log_parts(path_).size(), 3U);

@@ -20,6 +20,8 @@ from .page import reasons, write_page
 from .rooms import ROOMS, Room, Stage
 from .store import Store, key_of, tests_of
 
+SAMPLE = 40  # mutants per room
+
 
 def drawn(room: Room, name: str, root: Path, sample: int, seed: int) -> list[tuple[Path, str, Mutant]]:
     """A random sample of a room's mutants; a larger one contains a smaller one."""
@@ -33,11 +35,22 @@ def drawn(room: Room, name: str, root: Path, sample: int, seed: int) -> list[tup
 
 
 def unseen(
-    room: Room, name: str, root: Path, sample: int, seed: int, learnt: list[int]
+    room: Room,
+    name: str,
+    root: Path,
+    sample: int,
+    seed: int,
+    learnt: list[int],
+    learnt_sample: int = SAMPLE,
 ) -> list[tuple[Path, str, Mutant]]:
-    """A sample of another seed without the mutants of the samples for which tests were written."""
-    known = {each for one in learnt for each in drawn(room, name, root, sample, one)}
-    return [each for each in drawn(room, name, root, 0, seed) if each not in known][:sample]
+    """A sample of another seed without the mutants of the samples for which tests were written, whether these
+    were drawn of all mutants or without the samples before them."""
+    every = drawn(room, name, root, 0, seed)
+    known = {each for one in learnt for each in drawn(room, name, root, learnt_sample, one)}
+    if learnt:
+        last, before = learnt[-1], learnt[:-1]
+        known |= set(unseen(room, name, root, learnt_sample, last, before, learnt_sample))
+    return [each for each in every if each not in known][:sample]
 
 
 def kept(
@@ -115,7 +128,7 @@ def main() -> int:
         "tests/mutation/reasons.toml.",
     )
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)} (default: all)")
-    parser.add_argument("--sample", type=int, default=40, help="mutants per room (default 40; 0: all)")
+    parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants per room (default 40; 0: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
     parser.add_argument(
         "--learnt",
@@ -125,6 +138,9 @@ def main() -> int:
         metavar="SEED",
         help="samples for which tests were written: they are judged, too, and counted apart; that of --seed "
         "has none of their mutants",
+    )
+    parser.add_argument(
+        "--learnt-sample", type=int, default=SAMPLE, help="mutants per room of each of them (default 40)"
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time (default: the cores)")
     parser.add_argument("--list", action="store_true", help="print the sample and change nothing")
@@ -152,14 +168,14 @@ def main() -> int:
     store = Store(place / "results.jsonl")
     samples = {
         name: (
-            unseen(room, name, root, options.sample, options.seed, options.learnt)
+            unseen(room, name, root, options.sample, options.seed, options.learnt, options.learnt_sample)
             if options.learnt
             else drawn(room, name, root, options.sample, options.seed)
         )
         for name, room in chosen.items()
     }
     learnt = {
-        (name, seed): drawn(room, name, root, options.sample, seed)
+        (name, seed): drawn(room, name, root, options.learnt_sample, seed)
         for name, room in chosen.items()
         for seed in options.learnt
     }

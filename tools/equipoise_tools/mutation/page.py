@@ -25,8 +25,8 @@ compile, or to the same object code, are not counted.
 {what} Seed {seed}; intervals are Wilson's, 95 %.
 """
 TABLE = """
-| room | mutants in all | drawn | killed | survived | kill rate | wanted | holds |{more}
-|---|---|---|---|---|---|---|---|{rule}
+| room | mutants in all | drawn | killed | survived | explained | kill rate | wanted | holds |{more}
+|---|---|---|---|---|---|---|---|---|{rule}
 """
 
 
@@ -72,13 +72,17 @@ def write_page(
             "Survivors of older tests have not been tried on today's: kill rates are lower bounds."
         )
     page = HEAD.format(what=what, seed=seed)
-    seeds = " and ".join(str(seed) for seed in sorted({seed for _, seed in learnt}))
+    *others, last = sorted({seed for _, seed in learnt}) or [0]
+    seeds = f"{', '.join(map(str, others))} and {last}" if others else str(last)
     if learnt:
         page += (
             f"The samples of seed {seeds} showed what the tests lacked, and tests were written for them; "
             "none of their\nmutants is in this one, whose rate is the one that holds or not.\n"
         )
-    page += TABLE.format(more=f" seed {seeds} |" if learnt else "", rule="---|" if learnt else "")
+    beside = any(learnt.values())
+    if learnt and not beside:
+        page += "What became of theirs has not been measured again on today's tests.\n"
+    page += TABLE.format(more=f" seed {seeds} |" if beside else "", rule="---|" if beside else "")
     survivors, unexplained = "", []
     for name, outcomes in measured.items():
         tried, killed = counted(outcomes)
@@ -89,9 +93,13 @@ def write_page(
             for file, text, mutant, outcome in some
         }
         more = ""
-        if learnt:
+        if beside:
             before, noticed = counted(list(seen.values()))
             more = f" {noticed} of {before} |" if before else " not measured |"
+        explained = sum(
+            outcome.status == "survived" and (str(file), line_of(text, mutant), mutant.change) in why
+            for file, text, mutant, outcome in outcomes
+        )
         target = ROOMS[name].target
         whole = sum(len(mutants(path.read_text())) for path in ROOMS[name].paths(root))
         if tried:
@@ -100,9 +108,10 @@ def write_page(
             rate = f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
             holds = "yes" if share >= target else "**no**"
             holds = holds if tried >= FEWEST else "too few"
-            row = (name, whole, tried, killed, tried - killed, rate, f"{100 * target:.0f} %", holds)
+            lived = (tried - killed, explained)
+            row = (name, whole, tried, killed, *lived, rate, f"{100 * target:.0f} %", holds)
         else:
-            row = (name, whole, 0, "", "", "not measured", f"{100 * target:.0f} %", "not measured")
+            row = (name, whole, 0, "", "", "", "not measured", f"{100 * target:.0f} %", "not measured")
         page += f"| {' | '.join(map(str, row))} |{more}\n"
         for file, text, mutant, outcome in [*seen.values(), *outcomes]:
             if outcome.status != "survived":

@@ -96,7 +96,7 @@ ROOMS: dict[str, Room] = {
     "guard": Room(
         ("src/app/guard/guard.cpp", "src/app/guard/guard_bridges.cpp"),
         (
-            Stage("tests/unit_tests", ("unit/app/guard_loop_test.cpp",)),
+            Stage("tests/unit_tests", ("unit/app/guard_loop_test.cpp", "unit/app/guard_bridges_test.cpp")),
             Stage(
                 "tests/runtime/runtime_tests",
                 ("runtime/guard_test.cpp", "runtime/guard_command_test.cpp", ALLOCATION),
@@ -166,7 +166,13 @@ ROOMS: dict[str, Room] = {
     ),
     "replay": Room(
         ("src/app/log/replay.cpp", "src/app/log/replay_as.hpp"),
-        (Stage("tests/replay_tests", ("replay/fault_replay_test.cpp",)),),
+        (
+            Stage(
+                "tests/replay_tests",
+                ("replay/fault_replay_test.cpp", "replay/replay_result_test.cpp"),
+                sources=("src/app/log/replay.cpp",),
+            ),
+        ),
     ),
     "bridge": Room(
         ("include/equipoise/actuate/bridge.hpp", "src/actuate/drive_coast.cpp"),
