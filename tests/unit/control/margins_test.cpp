@@ -83,6 +83,20 @@ TEST(Margins, AroundACentreCountTheDelayFromTheWholeFrequency) {
       << "slow is near the centre, too";
 }
 
+/// An integrator turned by 40 degrees jumps there from one side to the other; its gain may change at will.
+TEST(Margins, TheCurveIsNotFollowedThroughZeroAndTheCentre) {
+  for (const double turned_rad : {0.7, -0.7}) {
+    for (const double centre_rad_s : {0.0, 30.0, -30.0}) {
+      const Margins m =
+          of([=](double w) { return 10.0 / (kJ * (w - centre_rad_s)) * std::polar(1.0, turned_rad); },
+             centre_rad_s);
+      EXPECT_TRUE(std::isinf(m.gain_up_dB)) << centre_rad_s << " " << m.gain_up_dB;
+      EXPECT_TRUE(std::isinf(m.gain_down_dB)) << centre_rad_s << " " << m.gain_down_dB;
+      EXPECT_NEAR(m.phase_deg, 90.0 - 0.7 * 90.0 / kHalfPi, 0.01);
+    }
+  }
+}
+
 TEST(Margins, TheWorseOfTwoIsTheWorseInEach) {
   const Margins a{6.0, -3.0, 40.0, 0.01, 1.0};
   const Margins b{5.0, -4.0, 50.0, 0.02, 0.5};
