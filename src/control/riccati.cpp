@@ -80,7 +80,8 @@ CMatrix riccati(const CMatrix& A_in, const CMatrix& B, const CMatrix& Q, const C
     G = 0.5 * (G + adjoint(G));
     H = 0.5 * (H + adjoint(H));
     const double size = H.norm();
-    if (!std::isfinite(size) || change.norm() <= 1e-16 * size) break;
+    if (!std::isfinite(size)) return CMatrix::Constant(n, n, std::numeric_limits<double>::quiet_NaN());
+    if (change.norm() <= 1e-16 * size) break;
   }
   return H;
 }

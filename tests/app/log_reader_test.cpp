@@ -65,6 +65,14 @@ TEST(LogReader, SkipsWhatIsNoEventAndCountsIt) {
   EXPECT_EQ(read.damaged, 3U + 44U + 1U);
 }
 
+TEST(LogReader, AnEventWithoutItsSyncIsNone) {
+  std::string damaged = event("B", "2");
+  damaged[2] = 'x';
+  const Read read = all(event("A", "1") + damaged + event("C", "3"));
+  EXPECT_THAT(read.events, ElementsAre("A=1@0", "C=3@0"));
+  EXPECT_EQ(read.damaged, damaged.size());
+}
+
 TEST(LogReader, ATornEndIsLeftOutWhereverItIsTorn) {
   const std::string whole = event("A", "1");
   const std::string last = event("CHANNEL", "data");

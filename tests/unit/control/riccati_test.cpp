@@ -44,6 +44,16 @@ TEST(Riccati, WithoutAnInputIsTheCostOfWaiting) {
   EXPECT_NEAR(riccati(0.5 * one, 0.0 * one, one, one)(0, 0).real(), 4.0 / 3.0, 1e-14);
 }
 
+TEST(Riccati, WhatNoInputReachesAndGrowsHasNoSolution) {
+  const CMatrix one = CMatrix::Ones(1, 1);
+  EXPECT_FALSE(riccati(2.0 * one, 0.0 * one, one, one).allFinite());
+  CMatrix A = CMatrix::Zero(2, 2);
+  A.diagonal() << 1.1, 0.5;
+  CMatrix B = CMatrix::Zero(2, 1);
+  B(1, 0) = 1.0;
+  EXPECT_FALSE(riccati(A, B, CMatrix::Identity(2, 2), one).allFinite());
+}
+
 TEST(Hold, IsExactWhereTheMotionHasAClosedForm) {
   for (const double t : {0.005, 0.3, 40.0}) {
     const Hold falling = hold(CMatrix{{0.0, 1.0}, {0.0, 0.0}}, CMatrix{{0.0}, {2.0}}, t);

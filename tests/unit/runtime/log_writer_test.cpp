@@ -6,8 +6,10 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "equipoise/runtime/log_parts.hpp"
 #include "support/file_size_limit.hpp"
@@ -146,6 +148,18 @@ TEST_F(LogWriterTest, ADeviceMayTakeTheLog) {
   ASSERT_TRUE(full.open("/dev/full", {}));
   write_tick(&full);
   EXPECT_THAT(full.error(), HasSubstr("log stopped: No space left on device"));
+}
+
+TEST_F(LogWriterTest, AFileThatCannotBeSyncedIsReported) {
+  LogLimits limits;
+  limits.sync = true;
+  LogWriter log;
+  ASSERT_TRUE(log.open("/dev/null", limits)) << log.error();
+  for (int i = 0; i < 10000 && log.error().empty(); ++i) {
+    write_tick(&log);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_THAT(log.error(), HasSubstr("log stopped: Invalid argument"));
 }
 
 TEST_F(LogWriterTest, AnotherProcessFindsTheLogLockedUntilItIsClosed) {
