@@ -109,7 +109,8 @@ TEST_F(QuietEvents, NothingThereIsToldWithoutBlocking) {
   EXPECT_EQ(events_wait(&events, -1), 1);
   EXPECT_EQ(events_next(&events, &event), 0);
   input_absinfo about{};
-  EXPECT_EQ(events_axis(&events, ABS_Y, &about), -ENOTTY) << "a pipe has no axes";
+  const int axis = events_axis(&events, ABS_Y, &about);  // qemu-arm says ENOSYS of what it does not know
+  EXPECT_TRUE(axis == -ENOTTY || axis == -ENOSYS) << "a pipe has no axes: " << axis;
   events_close(&events);
 }
 
