@@ -9,6 +9,7 @@ import equipoise_robot as eq
 import numpy as np
 import pytest
 from equipoise_robot import UserError, channels
+from equipoise_tools.speed import standing_policy
 
 pytest.importorskip("equipoise_robot._core", reason="needs python3-dev; tools/test installs it")
 
@@ -205,20 +206,13 @@ def test_environments_pass_gymnasiums_check(name):
     assert (other != first).any()
 
 
-def upright(names, gains):
-    """A policy from the eduMIP's LQR gains: wheel drives from the observation."""
-    K = np.zeros((2, len(names)))
-    for name, gain in zip(("theta", "phi", "theta_dot", "phi_dot"), gains["lqr"], strict=False):
-        K[:, names.index(name)] = gain
-    K[:, names.index("psi")] = gains["yaw_angle"], -gains["yaw_angle"]
-    K[:, names.index("psi_dot")] = gains["yaw_rate"], -gains["yaw_rate"]
-    return lambda observation: np.clip(observation @ K.T, -1.0, 1.0)
-
-
-def test_a_policy_keeps_the_robot_up_and_none_lets_it_fall():
+def test_a_policy_keeps_the_robot_up_and_none_lets_it_fall(root):
     gymnasium = pytest.importorskip("gymnasium")
     env = gymnasium.make("equipoise_robot.envs:Equipoise-Mip-v0", max_episode_steps=600)
-    policy = upright(env.unwrapped.observation_names, eq.design("mip", controller="lqr", last_hz=0.0).gains)
+    gains = standing_policy(root, "mip", env.unwrapped.observation_names)
+
+    def policy(observation):
+        return np.clip(gains @ observation, -1.0, 1.0)
 
     def flown(act):
         observation, _ = env.reset(seed=1)
@@ -257,6 +251,17 @@ def test_vectorised_steps_are_the_single_ones():
         np.testing.assert_array_equal(together[9][0][i], alone[9][0])
         assert together[9][1][i] == alone[9][1]
         np.testing.assert_array_equal(again[0][i], single.reset()[0])
+
+
+@pytest.mark.parametrize("robot", ["mip", "mbbr"])
+def test_the_policy_that_speed_is_measured_with_keeps_all_robots_up(root, robot):
+    envs_module = pytest.importorskip("equipoise_robot.envs")
+    envs = envs_module.BalanceVectorEnv(robot, num_envs=4)
+    gains = standing_policy(root, robot, envs.observation_names)
+    observation, _ = envs.reset(seed=1)
+    for _ in range(600):
+        observation, _, lost, _, _ = envs.step(observation @ gains.T)
+        assert not lost.any()
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
