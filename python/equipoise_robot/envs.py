@@ -101,10 +101,10 @@ class BalanceEnv(gymnasium.Env[Array, Array]):
         "full"."""
         self._robots = _Robots(
             robot,
-            1,
-            1,
-            population,
-            {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
+            count=1,
+            jobs=1,
+            population=population,
+            asked={"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
         )
         self.observation_space = self._robots.observation_space
         self.action_space = self._robots.action_space

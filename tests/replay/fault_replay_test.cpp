@@ -3,13 +3,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 
-#include "app/evaluate/fault_run.hpp"
-#include "app/log/replay_as.hpp"
-#include "equipoise/runtime/telemetry.hpp"
+#include "replay/recorded_run.hpp"
 #include "robots/robots.hpp"
-#include "support/trial.hpp"
 
 namespace equipoise {
 namespace {
@@ -27,36 +25,20 @@ struct Recorded {
 
 template <class Firmware>
 Recorded record(const std::string& path, FaultKind fault, app::Phase phase, std::uint64_t seed) {
-  app::Choice choice;
-  choice.fidelity = "nominal";
-  app::complete<Firmware>(choice);
-  const auto loaded = Firmware::load(config_file<Firmware>(), {});
-  const auto config = Firmware::apply(loaded.config, choice);
-  runtime::TelemetryOptions options;
-  options.log_path = path;
-  options.wait_when_full = true;
-  options.run = app::run_info<Firmware>(loaded, choice, static_cast<std::int64_t>(seed));
-  options.run.backend = "sim";
-  runtime::Telemetry telemetry(options);
   app::FaultPlan plan;
   plan.phase = phase;
   plan.fault = fault;
   plan.fault_at_tick = phase == app::Phase::kArming ? 60 : 400 + 7 * static_cast<int>(seed);
   plan.fault_ticks = 150;
   plan.end_tick = 800;
-  auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), seed);
   Recorded out;
-  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    runtime::TickRecord r{};
-    const auto keep = [&](std::int64_t tick, std::int64_t now_ns, const RawSample& raw,
-                          const Command& command, const auto& t) {
-      app::record_tick(tick, now_ns, raw, command, t, pipeline, &r);
-      telemetry.hand_over(r);
-      out.inhibit |= t.inhibit;
-      out.oldest_command_s = std::max(out.oldest_command_s, command.age_s);
-    };
-    (void)app::run_with_fault(world, pipeline, plan, seed, keep);
-  });
+  record_run<Firmware>(
+      path, plan, seed,
+      [&](auto& telemetry, const runtime::TickRecord& r, const Command& command, const auto& t) {
+        telemetry.hand_over(r);
+        out.inhibit |= t.inhibit;
+        out.oldest_command_s = std::max(out.oldest_command_s, command.age_s);
+      });
   return out;
 }
 

@@ -8,10 +8,7 @@
 #include <limits>
 
 #include "app/cli/errors.hpp"
-#include "app/evaluate/fault_run.hpp"
-#include "app/log/replay_as.hpp"
-#include "equipoise/runtime/telemetry.hpp"
-#include "support/trial.hpp"
+#include "replay/recorded_run.hpp"
 
 namespace equipoise {
 namespace {
@@ -155,34 +152,16 @@ class ReplayRun : public testing::Test {
   /// A nominal run that drives; `edit` may spoil a tick on its way to the log, or keep it (false).
   template <class Edit>
   void record(Edit&& edit) const {
-    app::Choice choice;
-    choice.fidelity = "nominal";
-    app::complete<Firmware>(choice);
-    const auto loaded = Firmware::load(config_file<Firmware>(), {});
-    const auto config = Firmware::apply(loaded.config, choice);
-    runtime::TelemetryOptions options;
-    options.log_path = path_;
-    options.wait_when_full = true;
-    options.run = app::run_info<Firmware>(loaded, choice, 1);
-    options.run.backend = "sim";
-    runtime::Telemetry telemetry(options);
     app::FaultPlan plan;
     plan.phase = app::Phase::kDriving;
     plan.fault_at_tick = 1 << 20;
     plan.end_tick = kTicks;
-    auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), 1);
-    Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-      TickRecord r{};
-      const auto keep = [&](std::int64_t tick, std::int64_t now_ns, const RawSample& raw,
-                            const Command& command, const auto& t) {
-        app::record_tick(tick, now_ns, raw, command, t, pipeline, &r);
-        r.has_truth = true;  // wrong by a known tilt
-        r.truth = r.estimate;
-        r.truth.theta_rad[0] += 0.02;
-        TickRecord logged = r;
-        if (edit(logged)) telemetry.hand_over(logged);
-      };
-      (void)app::run_with_fault(world, pipeline, plan, 1, keep);
+    record_run<Firmware>(path_, plan, 1, [&](auto& telemetry, const TickRecord& r, const auto&, const auto&) {
+      TickRecord logged = r;
+      logged.has_truth = true;  // wrong by a known tilt
+      logged.truth = r.estimate;
+      logged.truth.theta_rad[0] += 0.02;
+      if (edit(logged)) telemetry.hand_over(logged);
     });
   }
   app::Replay replayed(const app::Beside& beside = {}) const {
