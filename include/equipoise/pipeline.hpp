@@ -113,6 +113,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     std::uint32_t degraded = health_.lost * kWithoutWheelOne;
     if (!z.imu_ok) degraded |= kWithoutImu;
     if (health_.gyro_left_out) degraded |= kWithoutGyroAxis;
+    if (health_.gyro_bias_jumped) degraded |= kGyroBiasJumped;
     if (!z.encoders_ok) degraded |= kWithoutEncoders;
     for (int i = 0; i < Robot::kWheels && health_.predicts_wheels; ++i) {
       const bool lost = !z.encoders_ok || (health_.lost >> i & 1U) != 0;

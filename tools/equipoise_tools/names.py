@@ -86,6 +86,7 @@ DEGRADED = (
     "without wheel three",
     "without wheel four",
     "without gyro axis",
+    "gyro bias jumped",
 )
 
 

@@ -20,6 +20,7 @@ enum DegradedBit : std::uint32_t {
   kWithoutWheelThree = 1u << 5,
   kWithoutWheelFour = 1u << 6,
   kWithoutGyroAxis = 1u << 7,  // it is dead or lies
+  kGyroBiasJumped = 1u << 8,   // by how much is known
 };
 
 /// Not for a gap, but because they lie.
@@ -36,8 +37,8 @@ inline constexpr double kUnlimited = 1e9;
 
 /// A gap is over before a slower setpoint would help, and braking into it topples (8 of 50 at 1 Hz, 100 ms);
 /// who doubts his estimate stands; one encoder less leaves no second opinion on slip, so the robot goes no
-/// faster than it was tried.
-inline constexpr std::array<DegradedMode, 8> kDegradedModes{{
+/// faster than it was tried; so does one whose gyro may jump again.
+inline constexpr std::array<DegradedMode, 9> kDegradedModes{{
     {"without_imu", kUnlimited, kUnlimited},
     {"without_encoders", kUnlimited, kUnlimited},
     {"estimator_in_doubt", 0.0, 0.0},
@@ -46,6 +47,7 @@ inline constexpr std::array<DegradedMode, 8> kDegradedModes{{
     {"without_wheel_3", 0.1, 2.0 * kPi},
     {"without_wheel_4", 0.1, 2.0 * kPi},
     {"without_gyro_axis", 0.0, 0.0},
+    {"gyro_bias_jumped", 0.1, 2.0 * kPi},
 }};
 
 /// Calls `with(mode)` for every bit that is set.

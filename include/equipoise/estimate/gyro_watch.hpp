@@ -3,8 +3,9 @@
 // be what the wheels saw: torque turns body and wheels in a known ratio, and about some axes the wheels give
 // the rate itself. It lies where that agrees with an axis flipped or two swapped and not as it is, and where
 // no single encoder explains what they disagree about. A push agrees with neither; the accelerometer feels
-// it. In: Measurement, rates expected, what the filter knows -> out: the measurement without what lies, and
-// whether the gyro is trusted. Limits: chosen on robots 1 to 8 and 300 to 340 of the population. RT-safe.
+// it. A bias that jumps is taken off. In: Measurement, rates expected, what the filter knows -> out: the
+// measurement without what lies, and whether the gyro is trusted. Limits: chosen on robots 1 to 8 and 300 to
+// 340 of the population. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <cmath>
 #include <utility>
 
+#include "equipoise/estimate/bias_jump.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
@@ -22,7 +24,9 @@ struct GyroWatchParams {
       Mat<3, Wheels>::Zero();                 // change of body rate per change of wheel rate, by torque
   Vec3 sigma_rad_s = Vec3::Ones();            // of what is left of a change over three ticks
   Vec3 slow_sigma_rad_s = Vec3::Zero();       // the same over six ticks; zero: encoders are blamed unexamined
-  Vec3 max_step_rad_s = Vec3::Constant(2.0);  // of a rate against what was expected
+  Vec3 max_step_rad_s = Vec3::Constant(2.0);  // of a rate against what was expected; at least 1
+  Mat<3, Wheels> by_torque = Mat<3, Wheels>::Zero();  // what u does to the body's rates in a tick
+  Vec3 per_jump = Vec3::Zero();  // 1 over the least jump of the bias that is examined; zero: of no interest
   std::array<bool, 3> balances{true, true, true};  // axes without which the robot falls
   // Axes whose rate is known without a torque: `rate_from_wheels` times the wheels' rates and what the filter
   // adds.
@@ -65,47 +69,42 @@ class GyroWatch {
     noise_rad_s_ = 0.0;
     examined_.fill(true);
     accel_nis_ = 0.0;
+    jump_.reset();
     trusted_ = true;
     left_out_ = false;
     ticks_out_ = 0;
+    suspected_ = false;
+    u_.setZero();
+    u_before_.setZero();
   }
 
-  /// Leaves out what cannot be; the expected rate stands in.
-  void screen(Sample& z, const Vec3& expected_rad_s) noexcept {
+  /// Leaves out what cannot be; the expected rate stands in. `u` acted since the last sample.
+  void screen(Sample& z, const Vec3& expected_rad_s, const Vec<Wheels>& u) noexcept {
     left_out_ = false;
-    if (!z.imu_ok) return;
-    listen(z.gyro_B_rad_s);
-    const Vec3 step = z.gyro_B_rad_s - expected_rad_s;
-    mirrored_ = mirrors(believed(z, expected_rad_s), expected_rad_s) ? mirrored_ + 1 : 0;
-    if (mirrored_ >= kMirrored) condemn(nearest_);
-    const int wrong = static_cast<int>((step.array().abs() > p_.max_step_rad_s.array()).count());
-    const bool jolt = std::abs(z.accel_B_m_s2.norm() - kGravity_m_s2) > kMaxJolt_m_s2;
-    impossible_ = (wrong > 1 && mirrored_ == 0) || jolt ? impossible_ + 1 : 0;
-    if (impossible_ > kMaxImpossible) trusted_ = false;
-    if (impossible_ > 0) {
-      z.imu_ok = false;
+    const Vec<Wheels> u_before = std::exchange(u_before_, u_);
+    u_ = u;
+    if (!z.imu_ok) {
+      jump_.drop();
       return;
     }
-    bool needed = false;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto axis = static_cast<int>(i);
-      bool& ok = z.gyro_axis_ok[i];
-      int& away = away_[i];
-      away = std::abs(step(axis)) > p_.max_step_rad_s(axis) || away >= kGone ? std::min(away + 1, kGone) : 0;
-      ok = ok && away == 0 && mirrored_ == 0;  // the filter is kept clean of it while it is examined
-      if (ok) continue;
-      z.gyro_B_rad_s(axis) = expected_rad_s(axis);
-      left_out_ = true;
-      needed = needed || (p_.balances[i] && std::abs(step(axis)) > kMoves_rad_s);
-    }
-    ticks_out_ = left_out_ ? ticks_out_ + 1 : 0;
-    without_ = needed ? without_ + 1 : 0;
-    if (without_ > kMaxWithout) trusted_ = false;
+    z.gyro_B_rad_s -= jump_.bias_rad_s();
+    listen(z.gyro_B_rad_s);
+    const Vec3 step = z.gyro_B_rad_s - expected_rad_s;
+    const bool odd = step.squaredNorm() > kOdd_rad_s * kOdd_rad_s;
+    const bool jolt = z.accel_B_m_s2.squaredNorm() > kMaxAccel_m_s2 * kMaxAccel_m_s2;
+    const bool whole = z.gyro_axis_ok[0] && z.gyro_axis_ok[1] && z.gyro_axis_ok[2];
+    if (odd || jolt || !whole || suspected_) leave_out(z, step, expected_rad_s, odd, jolt);
+    const Vec3 jump = step - step_before_;
+    step_before_ = step;
+    if (jump_.examining() || jump.cwiseProduct(p_.per_jump).squaredNorm() > 1.0)
+      examine(z, expected_rad_s, jump, u_before);
   }
 
   /// What the gyro says, without axes that are left out, against all wheels, also one that is blamed already:
   /// should the gyro explain more, it was the wrong one.
   void compare(const Sample& z, const GyroWitness<Wheels>& witness) noexcept {
+    jump_.feel(witness.accel_nis);
+    carried_rad_s2_ = witness.carried_rad_s2;
     accel_nis_ += kAccelMean * (std::min(witness.accel_nis, kLargest) - accel_nis_);
     bool returns = false;  // an axis: what stood in for it is no sample
     for (std::size_t i = 0; i < 3; ++i) returns = returns || (z.gyro_axis_ok[i] && !examined_[i]);
@@ -143,6 +142,8 @@ class GyroWatch {
   bool trusted() const noexcept { return trusted_; }
   /// For longer than noise of a count or two repeats itself.
   bool left_out() const noexcept { return ticks_out_ >= kReported; }
+  /// What its bias has jumped by is taken off what it says.
+  bool bias_jumped() const noexcept { return jump_.jumps() > 0; }
 
  private:
   static constexpr std::size_t kHalf = 3;  // ticks: what happened in the last three against the three before
@@ -166,18 +167,22 @@ class GyroWatch {
   static constexpr double kMount = 0.015;    // rad, of the IMU: what an axis sees of the others
   static constexpr double kOdd_rad_s = 1.0;  // of a rate in a tick; hard pushes: 0.7
   static constexpr double kMirrors = 0.2;    // of it is left with another gyro
-  static constexpr int kMirrored = 3;        // ticks
-  static constexpr int kMaxImpossible = 3;   // samples in a row
+  static constexpr double kExplainsAJump = 0.5;  // of it
+  static constexpr double kOfNoise = 4.0;        // a jump is larger
+  static constexpr int kMirrored = 3;            // ticks
+  static constexpr int kMaxImpossible = 3;       // samples in a row
   static constexpr int kGone = 6;  // an axis that was so wrong for so long is not believed when it slows down
   // Ticks without an axis that balances, while it is wrong by so much: a quiet gyro on a robot that stands
   // quite still repeats itself, and harms nobody.
   static constexpr int kMaxWithout = 4;
   static constexpr double kMoves_rad_s = 0.05;
-  static constexpr int kReported = 4;              // ticks
-  static constexpr double kNoiseMean = 0.05;       // of second differences, 20 ticks
+  static constexpr int kMostJumps = 3;  // since reset: there and back, and once more
+  static constexpr int kBeforeAJump = BiasJump::kTicks + BiasJump::kMean;  // samples
+  static constexpr int kReported = 4;                                      // ticks
+  static constexpr double kNoiseMean = 0.05;                               // of second differences, 20 ticks
   static constexpr double kMostNoise_rad_s = 1.0;  // one bad sample of ten stays below 0.42
   static constexpr double kNoisy_rad_s = 0.6;      // sound robots stay below 0.18
-  static constexpr double kMaxJolt_m_s2 = 3.0 * kGravity_m_s2;
+  static constexpr double kMaxAccel_m_s2 = 4.0 * kGravity_m_s2;
   static constexpr int kStall = 4;  // ticks: the robot is caught with full torque, and its ball slips
   static constexpr int kSettling = 20;
   static constexpr double kAccelMean = 0.2;  // about six ticks
@@ -213,6 +218,7 @@ class GyroWatch {
 
   /// An axis that balances does not lie twice; others can be done without.
   void condemn(const Lie& lie) noexcept {
+    suspected_ = true;
     const auto i = static_cast<std::size_t>(lie.i);
     const auto k = static_cast<std::size_t>(lie.k);
     if (p_.balances[i] || p_.balances[k]) trusted_ = false;
@@ -242,13 +248,18 @@ class GyroWatch {
   bool mirrors(const Vec3& gyro_rad_s, const Vec3& expected_rad_s) noexcept {
     const double as_is = (gyro_rad_s - expected_rad_s).norm();
     if (!(as_is > kOdd_rad_s)) return false;
+    return left_with_a_lie(gyro_rad_s, expected_rad_s) < kMirrors * as_is;
+  }
+
+  /// Of the difference, with the lie taken back that explains most of it.
+  double left_with_a_lie(const Vec3& gyro_rad_s, const Vec3& expected_rad_s) noexcept {
     double least = kLargest;
     for (const Lie& lie : kLies) {
       const double left = (lie(gyro_rad_s) - expected_rad_s).norm();
       if (left < least) nearest_ = lie;
       least = std::min(least, left);
     }
-    return least < kMirrors * as_is;
+    return least;
   }
 
   /// One wheel's encoder may lie instead: what it says is free then.
@@ -283,6 +294,71 @@ class GyroWatch {
     s.by_wheels = p_.from_wheels * (turned / half_s - half_s * witness.carried_rad_s2);
     s.rate = p_.rate_from_wheels * ((angle[0] - angle[half]) / half_s).eval() + witness.rate_rad_s;
     return s;
+  }
+
+  void leave_out(Sample& z, const Vec3& step, const Vec3& expected_rad_s, bool odd, bool jolt) noexcept {
+    mirrored_ = odd && mirrors(believed(z, expected_rad_s), expected_rad_s) ? mirrored_ + 1 : 0;
+    if (mirrored_ >= kMirrored) condemn(nearest_);
+    const int wrong = static_cast<int>((step.array().abs() > p_.max_step_rad_s.array()).count());
+    impossible_ = (wrong > 1 && mirrored_ == 0) || jolt ? impossible_ + 1 : 0;
+    if (impossible_ > kMaxImpossible) trusted_ = false;
+    suspected_ = true;
+    if (impossible_ > 0) {
+      z.imu_ok = false;
+      return;
+    }
+    bool needed = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<int>(i);
+      bool& ok = z.gyro_axis_ok[i];
+      int& away = away_[i];
+      away = std::abs(step(axis)) > p_.max_step_rad_s(axis) || away >= kGone ? std::min(away + 1, kGone) : 0;
+      ok = ok && away == 0 && mirrored_ == 0;  // the filter is kept clean of it while it is examined
+      if (ok) continue;
+      z.gyro_B_rad_s(axis) = expected_rad_s(axis);
+      left_out_ = true;
+      needed = needed || (p_.balances[i] && std::abs(step(axis)) > kMoves_rad_s);
+    }
+    ticks_out_ = left_out_ ? ticks_out_ + 1 : 0;
+    without_ = needed ? without_ + 1 : 0;
+    if (without_ > kMaxWithout) trusted_ = false;
+    suspected_ = left_out_;  // what counts ticks in a row is back at zero
+  }
+
+  /// Has it jumped? Not where a lie or a torque explains it, nor where the gyro is suspected already.
+  void examine(Sample& z, const Vec3& expected_rad_s, const Vec3& jump_rad_s,
+               const Vec<Wheels>& u_before) noexcept {
+    const Vec3& before_rad_s = gyro_[latest_];
+    const auto explained = [&] {
+      const double size = jump_rad_s.norm();
+      const auto by = [&](const Vec<Wheels>& du) {
+        return jump_rad_s.dot(p_.by_torque * du) > kExplainsAJump * size * size;
+      };
+      return size < kOfNoise * noise_rad_s_ || by(u_ - u_before_) || by(u_before_ - u_before) ||
+             left_with_a_lie(z.gyro_B_rad_s, before_rad_s) < kExplainsAJump * size;
+    };
+    if (!z.imu_ok || left_out_ || samples_ < kBeforeAJump || evidence_ > 0.0 || contradicted_ > 0 ||
+        (!jump_.examining() && explained())) {
+      jump_.drop();
+      return;
+    }
+    if (!jump_.examine(z.gyro_B_rad_s, before_rad_s, jump_rad_s, p_.sigma_rad_s,
+                       [&] { return changed_by_wheels(z); }))
+      return;
+    z.gyro_B_rad_s = expected_rad_s;
+    z.gyro_axis_ok.fill(false);
+    if (!jump_.examining()) samples_ = 0;  // what stood in for the gyro is no sample
+    if (jump_.jumps() > kMostJumps) trusted_ = false;
+  }
+
+  /// As the wheels see it, of the three ticks up to `z` against the three before the gyro may have jumped.
+  Vec3 changed_by_wheels(const Sample& z) const noexcept {
+    constexpr double kMean_s = BiasJump::kMean * kTickS;
+    constexpr double kApart_s = BiasJump::kTicks * kTickS;
+    const Vec<Wheels>* const angle = &angle_[latest_];  // without `z`
+    const Vec<Wheels> turned = z.wheel_angle_rad - angle[BiasJump::kMean - 1] -
+                               (angle[BiasJump::kTicks - 1] - angle[kBeforeAJump - 1]);
+    return p_.from_wheels * (turned / kMean_s - kApart_s * carried_rad_s2_);
   }
 
   /// Gyro against wheels, squared, in sigmas.
@@ -383,7 +459,13 @@ class GyroWatch {
   std::array<Vec3, 2> heard_{Vec3::Zero(), Vec3::Zero()};  // latest first
   int listened_ = 0;
   double noise_rad_s_ = 0.0;
+  BiasJump jump_;
+  Vec3 step_before_ = Vec3::Zero();  // where the gyro was from what was expected, a tick ago
+  Vec<Wheels> carried_rad_s2_ = Vec<Wheels>::Zero();
   bool trusted_ = true;
+  Vec<Wheels> u_ = Vec<Wheels>::Zero();
+  Vec<Wheels> u_before_ = Vec<Wheels>::Zero();
+  bool suspected_ = false;  // an axis is left out, or something counts ticks in a row
   bool left_out_ = false;
   int ticks_out_ = 0;  // with an axis left out, in a row
 };

@@ -19,6 +19,7 @@ struct EstimatorHealth {
   double bias_drift_rad_s = 0.0;  // of the gyro, lately
   double disturbance = 0.0;       // of u: what acts like motors that do not do as told
   bool gyro_left_out = false;     // an axis of it
+  bool gyro_bias_jumped = false;  // and is taken off since
   bool gyro_trusted = true;
   bool predicts_wheels = false;  // `wheel_rate_rad_s` may stand in for an encoder
   Vec<Wheels> wheel_rate_rad_s = Vec<Wheels>::Zero();

@@ -36,10 +36,12 @@ GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
   const Mat3 body = B.middleRows<3>(MbbrEkfModel::kThetaDotX);
   GyroWatchParams<3> p;
   p.from_wheels = body * wheels.inverse();
+  p.by_torque = body;
   p.sigma_rad_s = {0.045, 0.045, 0.18};     // encoder counts, gravity, play: measured on robots 1 to 8
   p.slow_sigma_rad_s = {0.03, 0.03, 0.13};  // robots 1 to 100, 301 to 350, 451 to 500
   p.max_step_rad_s =
       Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
+  p.per_jump = {4.5, 4.5, 0.0};  // 0.22 rad/s; sound robots 2751 to 2810: examined in 0 of 1.2 million ticks
   p.balances = {true, true, false};
   p.by_rate = {false, false, true};  // the ball does not spin about the vertical
   p.rate_from_wheels.row(2) = yaw_from_wheels(kinematics).transpose();
@@ -107,6 +109,7 @@ EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
   h.bias_drift_rad_s = bias_drift_.distance();
   h.disturbance = ekf_.x().segment<3>(MbbrEkfModel::kDisturbance).norm();
   h.gyro_left_out = gyro_watch_.left_out();
+  h.gyro_bias_jumped = gyro_watch_.bias_jumped();
   h.gyro_trusted = gyro_watch_.trusted();
   h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
   h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
@@ -116,7 +119,7 @@ EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
 void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   MbbrEstimate& x = estimates_[index(Id::kEkf)];
   Mbbr::Sample believed = z;
-  gyro_watch_.screen(believed, x.omega_B);
+  gyro_watch_.screen(believed, x.omega_B, u);
   const double spin_rad_s = Mbbr::vertical_spin_rad_s(x);
   const double scale = believable_scale(ekf_.x()(MbbrEkfModel::kWheelScale));
   isolation_.step(ekf_, u, believed, [&](const Vec3& wheel_rates) {

@@ -19,9 +19,11 @@ GyroWatchParams<2> gyro_watch(const MipEstimatorParams& params) {
   }
   GyroWatchParams<2> p;
   p.from_wheels = body * wheels.inverse();
+  p.by_torque = body;
   p.sigma_rad_s = {0.12, 0.03, 0.15};  // gravity, play: measured on robots 1 to 8
   p.max_step_rad_s =
       Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
+  p.per_jump = {6.5, 0.0, 0.0};  // 0.15 rad/s; sound robots 2751 to 2810: examined in 1 of 1.2 million ticks
   p.balances = {true, false, false};
   p.by_rate = {false, true, true};  // y sees the yaw of a leaning robot, tyres do not slip
   p.rate_sigma_rad_s = {0.0, 0.06, 0.25};
@@ -133,7 +135,7 @@ void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   MipEstimate& x = estimates_[index(Id::kEkf)];
   Mip::Sample believed = z;
   const Vec3 expected_rad_s = body_rates(x);
-  gyro_watch_.screen(believed, expected_rad_s);
+  gyro_watch_.screen(believed, expected_rad_s, u);
   // Without slip the wheels turn the body as the gyro says, with the radii that the filter has learnt: 1.5 %
   // of 1 Hz would fill the memory of what has slipped as far as play does.
   const double scale = believable_scale(ekf_.x()(MipEkfModel::kWheelScale));
@@ -193,6 +195,7 @@ EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
   h.bias_drift_rad_s = bias_drift_.distance();
   h.disturbance = ekf_.x().segment<2>(MipEkfModel::kDisturbance).norm();
   h.gyro_left_out = gyro_watch_.left_out();
+  h.gyro_bias_jumped = gyro_watch_.bias_jumped();
   h.gyro_trusted = gyro_watch_.trusted();
   h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
   h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();

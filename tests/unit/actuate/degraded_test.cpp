@@ -13,7 +13,7 @@ TEST(Degraded, EveryBitHasANameOfItsOwn) {
   std::set<std::string> names;
   for_each_degraded(~0U, [&](const DegradedMode& mode) { names.insert(mode.name); });
   EXPECT_EQ(names.size(), kDegradedModes.size());
-  EXPECT_EQ(kWithoutGyroAxis, 1U << (kDegradedModes.size() - 1));
+  EXPECT_EQ(kGyroBiasJumped, 1U << (kDegradedModes.size() - 1));
 }
 
 TEST(Degraded, EveryBitIsNamedAfterItsWheel) {
@@ -30,6 +30,7 @@ TEST(Degraded, EveryBitIsNamedAfterItsWheel) {
   EXPECT_EQ(name(kWithoutWheelThree), "without_wheel_3");
   EXPECT_EQ(name(kWithoutWheelFour), "without_wheel_4");
   EXPECT_EQ(name(kWithoutGyroAxis), "without_gyro_axis");
+  EXPECT_EQ(name(kGyroBiasJumped), "gyro_bias_jumped");
   EXPECT_EQ(kSensorsLeftOut, 0xF8U);
 }
 
@@ -42,7 +43,7 @@ TEST(Degraded, WithoutWhatItBalancesByItStands) {
     EXPECT_EQ(limited(command, bit).yaw_rate_rad_s, 0.0);
   }
   for (const std::uint32_t bit :
-       {kWithoutWheelOne, kWithoutWheelTwo, kWithoutWheelThree, kWithoutWheelFour}) {
+       {kWithoutWheelOne, kWithoutWheelTwo, kWithoutWheelThree, kWithoutWheelFour, kGyroBiasJumped}) {
     EXPECT_NEAR(limited(command, bit).velocity_W_m_s.norm(), 0.1, 1e-12);
     EXPECT_NEAR(limited(command, bit).yaw_rate_rad_s, -2.0 * kPi, 1e-12);
   }

@@ -21,6 +21,8 @@ class Twist {
     p.sigma_rad_s = Vec3::Constant(0.05);
     p.max_step_rad_s = Vec3::Constant(3.0);
     p.balances = {true, true, false};
+    p.per_jump = {5.0, 5.0, 0.0};
+    p.by_torque.setIdentity();
     return p;
   }
 
@@ -37,21 +39,25 @@ class Twist {
       angle_ += kTickS * params().from_wheels.inverse() * omega;
       z.wheel_angle_rad = angle_;
       if (counts_backwards) z.wheel_angle_rad(0) *= -1.0;
-      watch_.screen(z, omega);
+      watch_.screen(z, omega, u);
       GyroWitness<3> witness;
       witness.accel_nis = accel_nis;
       witness.blamed_wheel = blames_wheel ? 0 : -1;
       witness.wheel_stands = wheel_stands;
       watch_.compare(z, witness);
+      off_rad_s = z.gyro_B_rad_s - omega;
       if (!watch_.trusted()) return i + 1;
     }
     return 0;
   }
   const GyroWatch<3>& watch() const { return watch_; }
+  void reset() { watch_.reset(); }
   bool blames_wheel = false;
   bool wheel_stands = false;
   bool counts_backwards = false;  // the wheel that is blamed
   double amplitude = 1.0;
+  Vec3 u = Vec3::Zero();          // torque, as an input
+  Vec3 off_rad_s = Vec3::Zero();  // what the filter gets of the lie
   double tempo = 1.0;
 
  private:
@@ -184,7 +190,7 @@ class EvenTurn {
       z.imu_ok = true;
       z.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
       z.gyro_B_rad_s = gyro;
-      watch.screen(z, turn);
+      watch.screen(z, turn, Vec3::Zero());
       clean = clean && (gyro == turn || !(z.gyro_B_rad_s - turn).norm() || watch.left_out());
       if (!watch.trusted()) return i;
     }
@@ -253,7 +259,7 @@ TEST(GyroWatchTest, AnAxisThatStandsStillMattersOnceTheRobotMoves) {
   const auto turns_by = [&](double rate_rad_s) {
     z.gyro_B_rad_s = Vec3::Zero();
     z.gyro_axis_ok = {false, true, true};
-    watch.screen(z, Vec3(rate_rad_s, 0.0, 0.0));
+    watch.screen(z, Vec3(rate_rad_s, 0.0, 0.0), Vec3::Zero());
     EXPECT_EQ(z.gyro_B_rad_s.x(), rate_rad_s);
   };
   for (int i = 0; i < 1000; ++i) turns_by(0.02);
@@ -272,10 +278,79 @@ TEST(GyroWatchTest, RejectsGarbageUnlessItLasts) {
     garbage.imu_ok = true;
     garbage.gyro_B_rad_s = Vec3(20.0, -15.0, 9.0);
     garbage.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
-    watch.screen(garbage, Vec3::Zero());
+    watch.screen(garbage, Vec3::Zero(), Vec3::Zero());
     EXPECT_FALSE(garbage.imu_ok);
     EXPECT_EQ(watch.trusted(), i < 4) << i;
   }
+}
+
+const Vec3 kJump(0.2, 0.2, 0.2);
+Vec3 jumped(const Vec3& omega) { return omega + kJump; }
+
+TEST(GyroWatchTest, ABiasThatJumpsIsTakenOffAndTheFilterNeverSeesIt) {
+  Twist twist;
+  ASSERT_EQ(twist.run(truth), 0);
+  for (int i = 0; i < 400; ++i) {
+    ASSERT_EQ(twist.run(jumped, 2.0, 1), 0);
+    ASSERT_LT(twist.off_rad_s.norm(), 1e-9) << i;
+  }
+  EXPECT_TRUE(twist.watch().bias_jumped());
+  EXPECT_FALSE(twist.watch().left_out());
+}
+
+TEST(GyroWatchTest, AGyroWhoseBiasJumpsAgainAndAgainIsNotTrusted) {
+  Twist twist;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(twist.run(truth), 0) << i;
+    ASSERT_EQ(twist.run(i % 2 == 0 ? jumped : truth), 0) << i;
+  }
+  EXPECT_EQ(twist.run(truth), 4);  // the fourth
+}
+
+TEST(GyroWatchTest, AJumpOfAnAxisThatDoesNotBalanceIsNotExamined) {
+  Twist twist;
+  ASSERT_EQ(twist.run(truth), 0);
+  ASSERT_EQ(twist.run([](const Vec3& omega) { return Vec3(omega + Vec3(0.0, 0.0, 0.4)); }), 0);
+  EXPECT_FALSE(twist.watch().bias_jumped());
+}
+
+TEST(GyroWatchTest, WhatATorqueExplainsIsNotExamined) {
+  Twist twist;
+  ASSERT_EQ(twist.run(truth), 0);
+  twist.u = kJump;
+  ASSERT_EQ(twist.run(jumped, 2.0, 1), 0);
+  EXPECT_LT((twist.off_rad_s - kJump).norm(), 1e-12);  // goes through
+
+  Twist late;  // the gyro sees it a tick later
+  ASSERT_EQ(late.run(truth), 0);
+  late.u = kJump;
+  ASSERT_EQ(late.run(truth, 2.0, 1), 0);
+  ASSERT_EQ(late.run(jumped, 2.0, 1), 0);
+  EXPECT_LT((late.off_rad_s - kJump).norm(), 1e-12);
+
+  Twist other;  // about another axis
+  ASSERT_EQ(other.run(truth), 0);
+  other.u = Vec3(0.2, -0.2, 0.2);
+  ASSERT_EQ(other.run(jumped, 2.0, 1), 0);
+  EXPECT_LT(other.off_rad_s.norm(), 1e-12);
+}
+
+TEST(GyroWatchTest, AFlipIsNotTakenForAJump) {
+  Twist twist;
+  twist.amplitude = 0.2;
+  ASSERT_EQ(twist.run(truth, 2.0, 100), 0);
+  (void)twist.run([](const Vec3& omega) { return Vec3(omega.cwiseProduct(Vec3(-1.0, 1.0, 1.0))); });
+  EXPECT_FALSE(twist.watch().bias_jumped());
+}
+
+TEST(GyroWatchTest, ResetForgetsTheJump) {
+  Twist twist;
+  ASSERT_EQ(twist.run(truth), 0);
+  ASSERT_EQ(twist.run(jumped), 0);
+  twist.reset();
+  EXPECT_FALSE(twist.watch().bias_jumped());
+  ASSERT_EQ(twist.run(jumped), 0);
+  EXPECT_LT((twist.off_rad_s - kJump).norm(), 1e-12);
 }
 
 }  // namespace

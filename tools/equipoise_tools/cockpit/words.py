@@ -46,6 +46,7 @@ DEGRADED = {
     "without wheel three": "encoder of wheel 3 left out: slower",
     "without wheel four": "encoder of wheel 4 left out: slower",
     "without gyro axis": "a gyro axis left out: it stands",
+    "gyro bias jumped": "the gyro's bias jumped and is taken off: slower",
 }
 
 
