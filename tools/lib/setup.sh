@@ -6,6 +6,8 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 venv=$root/build/venv
 venv_python=$venv/bin/python
+# The compiler's cache serves every build folder of a tree: the wheel's has what build/host compiled.
+export CCACHE_NOHASHDIR=1
 export MPLCONFIGDIR=$root/build/matplotlib # the font list of another environment on this machine is not ours
 jobs=$(nproc)
 
