@@ -14,6 +14,9 @@
 #include <utility>
 
 #include "equipoise/estimate/bias_jump.hpp"
+#include "equipoise/estimate/gyro_history.hpp"
+#include "equipoise/estimate/gyro_lie.hpp"
+#include "equipoise/estimate/gyro_noise.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
@@ -51,32 +54,11 @@ class GyroWatch {
  public:
   using Sample = Measurement<Wheels>;
 
-  explicit GyroWatch(const GyroWatchParams<Wheels>& params) : p_(params) { reset(); }
-
-  void reset() noexcept {
-    samples_ = 0;
-    impossible_ = 0;
-    away_.fill(0);
-    without_ = 0;
-    settling_ = 0;
-    evidence_ = 0.0;
-    for (Odds& odds : swapped_) odds = Odds::Zero();
-    weighs_ = false;
-    blamed_ = 0;
-    contradicted_ = 0;
-    mirrored_ = 0;
-    listened_ = 0;
-    noise_rad_s_ = 0.0;
-    examined_.fill(true);
-    accel_nis_ = 0.0;
-    jump_.reset();
-    trusted_ = true;
-    left_out_ = false;
-    ticks_out_ = 0;
-    suspected_ = false;
-    u_.setZero();
-    u_before_.setZero();
+  explicit GyroWatch(const GyroWatchParams<Wheels>& params) : p_(params) {
+    for (Odds& odds : swapped_) odds.setZero();
   }
+
+  void reset() noexcept { *this = GyroWatch(GyroWatchParams<Wheels>(p_)); }
 
   /// Leaves out what cannot be; the expected rate stands in. `u` acted since the last sample.
   void screen(Sample& z, const Vec3& expected_rad_s, const Vec<Wheels>& u) noexcept {
@@ -88,7 +70,8 @@ class GyroWatch {
       return;
     }
     z.gyro_B_rad_s -= jump_.bias_rad_s();
-    listen(z.gyro_B_rad_s);
+    noise_.hear(z.gyro_B_rad_s);
+    if (noise_.too_much()) trusted_ = false;
     const Vec3 step = z.gyro_B_rad_s - expected_rad_s;
     const bool odd = step.squaredNorm() > kOdd_rad_s * kOdd_rad_s;
     const bool jolt = z.accel_B_m_s2.squaredNorm() > kMaxAccel_m_s2 * kMaxAccel_m_s2;
@@ -110,7 +93,7 @@ class GyroWatch {
     for (std::size_t i = 0; i < 3; ++i) returns = returns || (z.gyro_axis_ok[i] && !examined_[i]);
     examined_ = z.gyro_axis_ok;
     if (!z.imu_ok || !z.encoders_ok || z.ticks > 1 || returns) {
-      samples_ = 0;
+      history_.forget();
       evidence_ = 0.0;
       for (Odds& odds : swapped_) odds = Odds::Zero();
       contradicted_ = 0;
@@ -118,21 +101,16 @@ class GyroWatch {
       return;
     }
     settling_ = std::max(settling_ - 1, 0);
-    latest_ = latest_ > 0 ? latest_ - 1 : kKept - 1;
-    gyro_[latest_] = gyro_[latest_ + kKept] = z.gyro_B_rad_s;
-    gyro_sum_[latest_] = gyro_sum_[latest_ + kKept] =
-        gyro_[latest_] + gyro_[latest_ + 1] + gyro_[latest_ + 2];
-    angle_[latest_] = angle_[latest_ + kKept] = z.wheel_angle_rad;
-    samples_ = std::min(samples_ + 1, static_cast<int>(kKept));
+    history_.add(z.gyro_B_rad_s, z.wheel_angle_rad);
     const bool calm = accel_nis_ < kPushed && settling_ == 0;
-    const bool examined = samples_ >= static_cast<int>(span(kHalf)) && calm;
+    const bool examined = history_.samples() >= History::span(kHalf) && calm;
     const Verdict verdict = examined ? judge(witness) : Verdict{};
     evidence_ = verdict.lies ? evidence_ + std::min(verdict.surprise, kMostOfATick) : 0.0;
     contradicted_ = verdict.unexplained > kContradiction ? contradicted_ + 1 : 0;
     if (contradicted_ >= kContradicted) trusted_ = false;
     const bool blames_wheel = witness.blamed_wheel >= 0;
     if (evidence_ > (blames_wheel ? kProofOfAnError : kProof)) condemn(nearest_);
-    if (samples_ == static_cast<int>(kKept) && calm && !witness.wheel_stands) weigh(witness);
+    if (history_.samples() == History::kKept && calm && !witness.wheel_stands) weigh(witness);
     blamed_ = blames_wheel ? std::min(blamed_ + 1, kSoon) : 0;
     if (blames_wheel && blamed_ < kSoon &&
         swapped_[static_cast<std::size_t>(witness.blamed_wheel)].maxCoeff() > kRather)
@@ -146,14 +124,12 @@ class GyroWatch {
   bool bias_jumped() const noexcept { return jump_.jumps() > 0; }
 
  private:
-  static constexpr std::size_t kHalf = 3;  // ticks: what happened in the last three against the three before
   // Swapped axes look like an encoder that counts wrongly within so few ticks; twice as many tell them apart.
   static constexpr std::size_t kSlowHalf = 6;
-  static_assert(kHalf == 3 && kSlowHalf % kHalf == 0);  // sums of three
-  static constexpr std::size_t span(std::size_t half) noexcept { return 2 * half + 1; }
-  static constexpr std::size_t kKept = span(kSlowHalf);
-  static constexpr double kSurprise = 60.0;        // squared, in sigmas
-  static constexpr double kMostOfATick = 120.0;    // a tick more is needed, whatever the last one says
+  using History = GyroHistory<Wheels, kSlowHalf>;
+  static constexpr std::size_t kHalf = History::kSum;  // so many ticks are held against as many before
+  static constexpr double kSurprise = 60.0;            // squared, in sigmas
+  static constexpr double kMostOfATick = 120.0;        // a tick more is needed, whatever the last one says
   static constexpr double kProof = 239.0;          // sum over consecutive ticks: two of the most and a little
   static constexpr double kContradiction = 150.0;  // that no encoder explains; sound robots stay below 80
   static constexpr int kContradicted = 3;          // ticks
@@ -177,11 +153,8 @@ class GyroWatch {
   static constexpr int kMaxWithout = 4;
   static constexpr double kMoves_rad_s = 0.05;
   static constexpr int kMostJumps = 3;  // since reset: there and back, and once more
-  static constexpr int kBeforeAJump = BiasJump::kTicks + BiasJump::kMean;  // samples
-  static constexpr int kReported = 4;                                      // ticks
-  static constexpr double kNoiseMean = 0.05;                               // of second differences, 20 ticks
-  static constexpr double kMostNoise_rad_s = 1.0;  // one bad sample of ten stays below 0.42
-  static constexpr double kNoisy_rad_s = 0.6;      // sound robots stay below 0.18
+  static constexpr std::size_t kBeforeAJump = BiasJump::kTicks + BiasJump::kMean;  // samples
+  static constexpr int kReported = 4;                                              // ticks
   static constexpr double kMaxAccel_m_s2 = 4.0 * kGravity_m_s2;
   static constexpr int kStall = 4;  // ticks: the robot is caught with full torque, and its ball slips
   static constexpr int kSettling = 20;
@@ -189,51 +162,17 @@ class GyroWatch {
   static constexpr double kPushed = 10.0;
   static constexpr double kLargest = 1000.0;
 
-  /// A gyro that lies: axis `i` flipped or, where `k` is another, the two swapped. Swapped axes of a sensor
-  /// that is mounted on its side swap with their signs.
-  struct Lie {
-    int i;
-    int k;
-    double sign;
-    Vec3 operator()(const Vec3& rate) const noexcept {
-      Vec3 r = rate;
-      r(i) = sign * rate(k);
-      r(k) = sign * rate(i);
-      return r;
-    }
-  };
-  static constexpr std::array<Lie, 9> kLies{{{0, 0, -1.0},
-                                             {1, 1, -1.0},
-                                             {2, 2, -1.0},
-                                             {0, 1, 1.0},
-                                             {1, 2, 1.0},
-                                             {2, 0, 1.0},
-                                             {0, 1, -1.0},
-                                             {1, 2, -1.0},
-                                             {2, 0, -1.0}}};
-
   /// Those that swap the vertical with another, which is what the encoders are compared with.
   static constexpr std::array<std::size_t, 4> kTakenForAnEncoder{4, 5, 7, 8};
   using Odds = Vec<static_cast<int>(kTakenForAnEncoder.size())>;
 
   /// An axis that balances does not lie twice; others can be done without.
-  void condemn(const Lie& lie) noexcept {
+  void condemn(const GyroLie& lie) noexcept {
     suspected_ = true;
     const auto i = static_cast<std::size_t>(lie.i);
     const auto k = static_cast<std::size_t>(lie.k);
     if (p_.balances[i] || p_.balances[k]) trusted_ = false;
     away_[i] = away_[k] = kGone;
-  }
-
-  /// No robot shakes like that, and none can balance on it.
-  void listen(const Vec3& gyro_rad_s) noexcept {
-    const Vec3 second = gyro_rad_s - 2.0 * heard_[0] + heard_[1];
-    heard_[1] = heard_[0];
-    heard_[0] = gyro_rad_s;
-    listened_ = std::min(listened_ + 1, 3);
-    if (listened_ < 3) return;
-    noise_rad_s_ += kNoiseMean * (std::min(second.cwiseAbs().maxCoeff(), kMostNoise_rad_s) - noise_rad_s_);
-    if (noise_rad_s_ > kNoisy_rad_s) trusted_ = false;
   }
 
   Vec3 believed(const Sample& z, const Vec3& expected_rad_s) const noexcept {
@@ -254,7 +193,7 @@ class GyroWatch {
   /// Of the difference, with the lie taken back that explains most of it.
   double left_with_a_lie(const Vec3& gyro_rad_s, const Vec3& expected_rad_s) noexcept {
     double least = kLargest;
-    for (const Lie& lie : kLies) {
+    for (const GyroLie& lie : kGyroLies) {
       const double left = (lie(gyro_rad_s) - expected_rad_s).norm();
       if (left < least) nearest_ = lie;
       least = std::min(least, left);
@@ -278,21 +217,13 @@ class GyroWatch {
   };
 
   Seen seen(std::size_t half, const GyroWitness<Wheels>& witness) const noexcept {
-    const Vec3* const gyro = &gyro_sum_[latest_];
-    const Vec<Wheels>* const angle = &angle_[latest_];
-    const double share = 1.0 / static_cast<double>(half);
+    const auto span = history_.latest(half);
     const double half_s = static_cast<double>(half) * kTickS;
     Seen s;
-    Vec3 before = Vec3::Zero();
-    for (std::size_t i = 0; i < half; i += kHalf) {
-      s.mean += gyro[i];
-      before += gyro[half + i];
-    }
-    s.mean *= share;
-    s.change = s.mean - share * before;
-    const Vec<Wheels> turned = angle[0] - 2.0 * angle[half] + angle[2 * half];
-    s.by_wheels = p_.from_wheels * (turned / half_s - half_s * witness.carried_rad_s2);
-    s.rate = p_.rate_from_wheels * ((angle[0] - angle[half]) / half_s).eval() + witness.rate_rad_s;
+    s.mean = span.mean_rad_s;
+    s.change = span.change_rad_s;
+    s.by_wheels = p_.from_wheels * (span.turned_more_rad / half_s - half_s * witness.carried_rad_s2);
+    s.rate = p_.rate_from_wheels * (span.turned_rad / half_s).eval() + witness.rate_rad_s;
     return s;
   }
 
@@ -328,16 +259,16 @@ class GyroWatch {
   /// Has it jumped? Not where a lie or a torque explains it, nor where the gyro is suspected already.
   void examine(Sample& z, const Vec3& expected_rad_s, const Vec3& jump_rad_s,
                const Vec<Wheels>& u_before) noexcept {
-    const Vec3& before_rad_s = gyro_[latest_];
+    const Vec3& before_rad_s = history_.gyro_rad_s();
     const auto explained = [&] {
       const double size = jump_rad_s.norm();
       const auto by = [&](const Vec<Wheels>& du) {
         return jump_rad_s.dot(p_.by_torque * du) > kExplainsAJump * size * size;
       };
-      return size < kOfNoise * noise_rad_s_ || by(u_ - u_before_) || by(u_before_ - u_before) ||
+      return size < kOfNoise * noise_.rad_s() || by(u_ - u_before_) || by(u_before_ - u_before) ||
              left_with_a_lie(z.gyro_B_rad_s, before_rad_s) < kExplainsAJump * size;
     };
-    if (!z.imu_ok || left_out_ || samples_ < kBeforeAJump || evidence_ > 0.0 || contradicted_ > 0 ||
+    if (!z.imu_ok || left_out_ || history_.samples() < kBeforeAJump || evidence_ > 0.0 || contradicted_ > 0 ||
         (!jump_.examining() && explained())) {
       jump_.drop();
       return;
@@ -347,7 +278,7 @@ class GyroWatch {
       return;
     z.gyro_B_rad_s = expected_rad_s;
     z.gyro_axis_ok.fill(false);
-    if (!jump_.examining()) samples_ = 0;  // what stood in for the gyro is no sample
+    if (!jump_.examining()) history_.forget();  // what stood in for the gyro is no sample
     if (jump_.jumps() > kMostJumps) trusted_ = false;
   }
 
@@ -355,9 +286,7 @@ class GyroWatch {
   Vec3 changed_by_wheels(const Sample& z) const noexcept {
     constexpr double kMean_s = BiasJump::kMean * kTickS;
     constexpr double kApart_s = BiasJump::kTicks * kTickS;
-    const Vec<Wheels>* const angle = &angle_[latest_];  // without `z`
-    const Vec<Wheels> turned = z.wheel_angle_rad - angle[BiasJump::kMean - 1] -
-                               (angle[BiasJump::kTicks - 1] - angle[kBeforeAJump - 1]);
+    const Vec<Wheels> turned = history_.turned_more_rad(z.wheel_angle_rad, BiasJump::kMean, BiasJump::kTicks);
     return p_.from_wheels * (turned / kMean_s - kApart_s * carried_rad_s2_);
   }
 
@@ -385,7 +314,7 @@ class GyroWatch {
     if (as_is <= kDoubt && !weighs_) return;  // nor would it be more with what follows
     Odds lies;
     for (std::size_t k = 0; k < kTakenForAnEncoder.size(); ++k) {
-      const Lie& lie = kLies[kTakenForAnEncoder[k]];
+      const GyroLie& lie = kGyroLies[kTakenForAnEncoder[k]];
       lies(static_cast<int>(k)) = misfit(lie(s.change), lie(s.mean), s, p_.slow_sigma_rad_s);
     }
     lies = lies.cwiseMin(kMostOfAWeighing);
@@ -411,7 +340,7 @@ class GyroWatch {
     Verdict verdict;
     if (!(as_is > kSurprise)) return verdict;
     double other = kLargest * kLargest;
-    for (const Lie& lie : kLies) {
+    for (const GyroLie& lie : kGyroLies) {
       if (!examined_[static_cast<std::size_t>(lie.i)] || !examined_[static_cast<std::size_t>(lie.k)])
         continue;
       const double left = misfit(lie(s.change), lie(s.mean), s, p_.sigma_rad_s);
@@ -436,29 +365,22 @@ class GyroWatch {
   }
 
   GyroWatchParams<Wheels> p_;
-  // The latest kKept samples from `latest_` on, latest first; each is written twice, so that none is moved.
-  std::array<Vec3, 2 * kKept> gyro_{};
-  std::array<Vec3, 2 * kKept> gyro_sum_{};  // of kHalf from there on
-  std::array<Vec<Wheels>, 2 * kKept> angle_{};
-  std::size_t latest_ = 0;
+  History history_;
   std::array<bool, 3> examined_{true, true, true};  // axes
-  int samples_ = 0;
   int impossible_ = 0;
   std::array<int, 3> away_{};  // samples in a row with an impossible rate; kGone: for good
   int without_ = 0;
   int settling_ = 0;  // ticks left
   double evidence_ = 0.0;
   // Per lie, against that wheel's encoder; is one of them more than zero?
-  std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_;  // by reset()
+  std::array<Odds, static_cast<std::size_t>(Wheels)> swapped_;
   bool weighs_ = false;
-  int blamed_ = 0;          // ticks since an encoder is left out
-  int contradicted_ = 0;    // ticks in a row
-  int mirrored_ = 0;        // ticks in a row
-  Lie nearest_ = kLies[0];  // that explains most
+  int blamed_ = 0;                  // ticks since an encoder is left out
+  int contradicted_ = 0;            // ticks in a row
+  int mirrored_ = 0;                // ticks in a row
+  GyroLie nearest_ = kGyroLies[0];  // that explains most
   double accel_nis_ = 0.0;
-  std::array<Vec3, 2> heard_{Vec3::Zero(), Vec3::Zero()};  // latest first
-  int listened_ = 0;
-  double noise_rad_s_ = 0.0;
+  GyroNoise noise_;
   BiasJump jump_;
   Vec3 step_before_ = Vec3::Zero();  // where the gyro was from what was expected, a tick ago
   Vec<Wheels> carried_rad_s2_ = Vec<Wheels>::Zero();

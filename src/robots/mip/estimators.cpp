@@ -23,7 +23,7 @@ GyroWatchParams<2> gyro_watch(const MipEstimatorParams& params) {
   p.sigma_rad_s = {0.12, 0.03, 0.15};  // gravity, play: measured on robots 1 to 8
   p.max_step_rad_s =
       Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
-  p.per_jump = {6.5, 0.0, 0.0};  // 0.15 rad/s; sound robots 2751 to 2810: examined in 1 of 1.2 million ticks
+  p.per_jump = {6.5, 0.0, 0.0};                                     // 0.15 rad/s; more than sound robots show
   p.balances = {true, false, false};
   p.by_rate = {false, true, true};  // y sees the yaw of a leaning robot, tyres do not slip
   p.rate_sigma_rad_s = {0.0, 0.06, 0.25};
