@@ -91,6 +91,7 @@ std::uint32_t with_samples(std::function<void(RawSample&, std::int64_t)> spoil,
 /// Driven off right after arming: a wheel that has to turn shows at once what its encoder is worth.
 std::uint32_t driven_off(std::function<void(RawSample&, std::int64_t)> spoil) {
   Scene scene;
+  scene.set = {"reference.max_jerk_m_s3=3.0"};
   scene.spoil = std::move(spoil);
   scene.commands = [](std::int64_t tick, std::int64_t) {
     Command command;

@@ -4,12 +4,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "equipoise/types.hpp"
 
 namespace equipoise {
 
-/// Velocity in N directions; reaches the target without overshoot.
+/// Velocity in N directions; reaches the target without overshoot. Its jerk is fed forward, so that it must
+/// not be the law's own chatter, also while the target moves: a path, a stick.
 template <int N>
 class SmoothVelocity {
  public:
@@ -25,7 +27,7 @@ class SmoothVelocity {
     const double length = missing.norm();
     // What can still be taken back by the target, a tick being gone by then, and no more than reaches it now.
     const double left = std::max(0.0, length - kTickS * acceleration_.norm());
-    const double size = std::min({limits.acceleration, std::sqrt(2.0 * limits.jerk * left), length / kTickS});
+    const double size = std::min({limits.acceleration, closing(left, limits.jerk), length / kTickS});
     const Vec<N> wish = length > 0.0 ? Vec<N>(missing * (size / length)) : Vec<N>(Vec<N>::Zero());
     const Vec<N> change = wish - acceleration_;
     const double step = limits.jerk * kTickS;
@@ -41,6 +43,15 @@ class SmoothVelocity {
   const Vec<N>& jerk() const noexcept { return jerk_; }
 
  private:
+  static constexpr double kNear_per_s = 10.0;  // the last bit of the way is closed like a low pass
+
+  /// Acceleration with which `left` is closed: at constant jerk down to where that would take ever more gain.
+  static double closing(double left, double jerk) noexcept {
+    if (!std::isfinite(jerk)) return jerk;
+    const double near = jerk / (kNear_per_s * kNear_per_s);
+    return left > near ? std::sqrt(2.0 * jerk * (left - 0.5 * near)) : kNear_per_s * left;
+  }
+
   Vec<N> velocity_ = Vec<N>::Zero();
   Vec<N> acceleration_ = Vec<N>::Zero();
   Vec<N> jerk_ = Vec<N>::Zero();

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "equipoise/control/allocate.hpp"
 #include "robots/mip/design.hpp"
 
@@ -35,6 +38,39 @@ TEST(SmoothVelocity, StaysWithinItsLimitsWhenTheTargetJumps) {
     EXPECT_LE((v.acceleration() - before).norm(), 3.0 * kTickS + 1e-9);
     before = v.acceleration();
   }
+}
+
+/// Of the jerk that is fed forward, from `from_s` on.
+template <class Target>
+double most_jerk(Target&& target, double from_s) {
+  SmoothVelocity<2> v;
+  double most = 0.0;
+  for (int k = 0; k < 2000; ++k) {
+    const double t_s = k * kTickS;
+    v.update(target(t_s), kLimits);
+    if (t_s > from_s) most = std::max(most, v.jerk().norm());
+  }
+  return most;
+}
+
+TEST(SmoothVelocity, GoesAlongWithATargetThatMovesWithoutChatter) {
+  const auto circle = [](double t_s) { return Vec2(0.1 * std::sin(t_s), 0.1 - 0.1 * std::cos(t_s)); };
+  EXPECT_LT(most_jerk(circle, 1.0), 0.11) << "the circle's own is 0.1";
+  const auto ramp = [](double t_s) { return Vec2(0.05 * t_s, 0.0); };
+  EXPECT_LT(most_jerk(ramp, 2.0), 1e-6);
+}
+
+TEST(SmoothVelocity, TakesTheStepsOfACommandLinkWithLessThanItsJerk) {
+  const auto stick = [](double t_s) { return Vec2(0.0, 0.05 * 0.02 * std::floor(t_s / 0.02)); };
+  EXPECT_LT(most_jerk(stick, 1.0), 0.7 * kLimits.jerk) << "0.05 m/s2, told fifty times a second";
+}
+
+TEST(SmoothVelocity, FollowsATargetThatMovesOn) {
+  SmoothVelocity<2> v;
+  const auto target = [](int k) { return Vec2(0.2 + 0.1 * k * kTickS, 0.0); };
+  for (int k = 0; k < 400; ++k) v.update(target(k), kLimits);
+  EXPECT_LT((v.velocity() - target(399)).norm(), 0.011) << "a tenth of a second behind";
+  EXPECT_NEAR(v.acceleration().x(), 0.1, 1e-6);
 }
 
 TEST(SmoothVelocity, WithoutAJerkLimitIsAPlainSlewWithNothingToFeedForward) {
