@@ -29,7 +29,9 @@ struct Range {
 /// Holds each command for 0.1 to 3 s; a third of them at the ends of the range.
 class RandomPilot {
  public:
-  RandomPilot(const Range& range, std::uint64_t seed) : range_(range), random_(seed) {}
+  /// `by_hand`: moves a stick to its commands, half a second each, and tells them fifty times a second.
+  RandomPilot(const Range& range, std::uint64_t seed, bool by_hand)
+      : range_(range), random_(seed), by_hand_(by_hand) {}
 
   Command at(double time_s) {
     command_.arm = time_s >= 0.5;
@@ -39,7 +41,16 @@ class RandomPilot {
       command_.velocity_W_m_s = amount() * range_.speed_m_s * Vec2(std::cos(direction), std::sin(direction));
       command_.yaw_rate_rad_s = (uniform() < 0.5 ? -1.0 : 1.0) * amount() * range_.yaw_rate_rad_s;
     }
-    return command_;
+    if (!by_hand_) return command_;
+    if (time_s >= next_told_s_) {
+      constexpr double kTold_s = 0.02;
+      constexpr double kHand_s = 0.5;
+      next_told_s_ = time_s + kTold_s;
+      told_.velocity_W_m_s += kTold_s / kHand_s * (command_.velocity_W_m_s - told_.velocity_W_m_s);
+      told_.yaw_rate_rad_s += kTold_s / kHand_s * (command_.yaw_rate_rad_s - told_.yaw_rate_rad_s);
+    }
+    told_.arm = command_.arm;
+    return told_;
   }
 
  private:
@@ -51,8 +62,10 @@ class RandomPilot {
 
   Range range_;
   std::mt19937_64 random_;
-  Command command_;
+  bool by_hand_;
+  Command command_, told_;
   double next_s_ = 1.5;
+  double next_told_s_ = 0.0;
 };
 
 struct Trials {
@@ -61,6 +74,7 @@ struct Trials {
   std::vector<std::string> set{};
   bool governed = true;
   int times = 1;  // as many sequences
+  bool by_hand = false;
 };
 
 /// Slew limits as they were before there was a governor, and nothing else of it.
@@ -77,7 +91,7 @@ void bypass_governor(Params& reference) {
 template <class Firmware, class Config>
 std::string loss(const Config& config, const Trials& t, std::uint64_t seed) {
   auto world = Firmware::world(config, app::fidelity_level("full"), seed);
-  RandomPilot pilot(t.range, 1000U + seed);
+  RandomPilot pilot(t.range, 1000U + seed, t.by_hand);
   return Firmware::with_pipeline(config, t.controller, [&](auto& pipeline) {
     app::PlantBackend backend(world);
     app::Hardware hardware(backend.io());
@@ -119,6 +133,14 @@ const Range kMipRange{0.8, 10.0};
 
 TEST(RandomCommands, NoneMakesTheMbbrFall) {
   EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange}), 0);
+}
+
+TEST(RandomCommands, NoneByHandMakesARobotFall) {
+  Trials mbbr{"scheduled", kMbbrRange};
+  Trials mip{"slc", kMipRange};
+  mbbr.by_hand = mip.by_hand = true;
+  EXPECT_EQ(lost<app::MbbrFirmware>(mbbr), 0);
+  EXPECT_EQ(lost<app::MipFirmware>(mip), 0);
 }
 
 /// Of one sequence of the MBBR.
