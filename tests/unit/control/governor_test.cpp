@@ -54,7 +54,9 @@ double most_jerk(Target&& target, double from_s) {
 }
 
 TEST(SmoothVelocity, GoesAlongWithATargetThatMovesWithoutChatter) {
-  const auto circle = [](double t_s) { return 0.1 * Vec2(std::sin(0.1 * t_s), 1.0 - std::cos(0.1 * t_s)); };
+  const auto circle = [](double t_s) {
+    return Vec2(0.1 * std::sin(0.1 * t_s), 0.1 - 0.1 * std::cos(0.1 * t_s));
+  };
   EXPECT_LT(most_jerk(circle, 2.0), 0.0011) << "the circle's own is 0.001";
   const auto ramp = [](double t_s) { return Vec2(0.05 * t_s, 0.0); };
   EXPECT_LT(most_jerk(ramp, 2.0), 1e-6);
