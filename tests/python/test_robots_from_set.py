@@ -74,3 +74,4 @@ def test_a_ball_bot_of_kugles_size_balances_and_drives(root):
             result = simulate(root, "kugle", {}, "--fidelity", NOMINAL, "--seed", str(seed), *motion)
             assert not result["fell"], result
             assert result["position_rmse_m"] < 1.0
+        assert not simulate(root, "kugle", {}, "--fidelity", "full", *motion)["fell"]
