@@ -54,12 +54,12 @@ class _Robots:
         asked: dict[str, Any],
     ):
         self.request = request(robot, duration_s=_LONGEST_S, **asked)
-        self.episodes = _core.Episodes(self.request, count, jobs)
-        self.population = population
-        self.names = self.episodes.observation_names
+        self.names = _core.observation_names(_core.robot_type(self.request.config))
         weights = [1.0 / _SCALES[name] if name in _SCALES else 0.0 for name in self.names]
-        self.weights = np.array(weights)
+        self.episodes = _core.Episodes(self.request, count, jobs, weights, _ACTION_COST)
+        self.population = population
         self.observations = np.zeros((count, len(self.names)))
+        self.rewards = np.zeros(count)
         self.lost = np.zeros(count, bool)
         # Bounded only by what safety lets pass: an observation outside has ended its episode.
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(self.names),), np.float64)
@@ -74,12 +74,10 @@ class _Robots:
         seeds = [int(random.integers(1 << 63)) for random in randoms]
         self.episodes.reset(which, seeds, numbers, self.observations)
 
-    def step(self, actions: Array, active: NDArray[np.bool_]) -> Array:
-        """Rewards: 1 for a tick upright, less the squared errors and the drive's."""
-        self.episodes.step(actions, self.observations, self.lost, active)
-        cost = np.square(self.observations * self.weights).sum(axis=1)
-        cost += _ACTION_COST * np.square(actions).sum(axis=1)
-        return np.where(self.lost, 0.0, 1.0 - np.minimum(cost, 1.0))
+    def step(self, actions: Array, active: NDArray[np.bool_]) -> None:
+        """Observations, rewards and who is lost, of those that are active."""
+        actions = np.ascontiguousarray(actions, np.float64)
+        self.episodes.step(actions, active, self.observations, self.rewards, self.lost)
 
 
 class BalanceEnv(gymnasium.Env[Array, Array]):
@@ -127,9 +125,9 @@ class BalanceEnv(gymnasium.Env[Array, Array]):
         return self._robots.observations[0].copy(), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        actions = np.clip(np.asarray(action, np.float64), -1.0, 1.0).reshape(1, -1)
-        reward = self._robots.step(actions, self._active)
-        return self._robots.observations[0].copy(), float(reward[0]), bool(self._robots.lost[0]), False, {}
+        robots = self._robots
+        robots.step(np.reshape(action, (1, -1)), self._active)
+        return robots.observations[0].copy(), float(robots.rewards[0]), bool(robots.lost[0]), False, {}
 
 
 class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
@@ -161,8 +159,10 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
             {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
         )
         self._limit = max_episode_steps
-        self._steps = np.zeros(num_envs, np.int64)
-        self._ended = np.zeros(num_envs, bool)
+        self._now = 0
+        self._ends = np.zeros(num_envs, np.int64)  # when each reaches the limit
+        self._active = np.ones(num_envs, bool)  # in the next step; the others are reset
+        self._again: list[int] = []
         self._each = range(num_envs)
         self._random: list[np.random.Generator] = []
         self.single_observation_space = self._robots.observation_space
@@ -182,20 +182,23 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
             if one is not None or i >= len(self._random):
                 self._random[i : i + 1] = [np_random(one)[0]]
         self._robots.reset(list(self._each), self._random)
-        self._steps[:] = 0
-        self._ended[:] = False
+        self._ends[:] = self._now + self._limit
+        self._active[:] = True
+        self._again = []
         return self._robots.observations.copy(), {}
 
     def step(
         self, actions: Array
     ) -> tuple[Array, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        again = np.flatnonzero(self._ended).tolist()
-        actions = np.ascontiguousarray(np.clip(actions, -1.0, 1.0), np.float64)
-        rewards = self._robots.step(actions, ~self._ended)
-        self._steps += 1
-        if again:
-            self._robots.reset(again, [self._random[i] for i in again])
-            self._steps[again], self._robots.lost[again], rewards[again] = 0, False, 0.0
-        truncated = (self._steps >= self._limit) & ~self._robots.lost
-        self._ended = self._robots.lost | truncated
-        return self._robots.observations.copy(), rewards, self._robots.lost.copy(), truncated, {}
+        robots = self._robots
+        robots.step(actions, self._active)
+        self._now += 1
+        if self._again:
+            robots.reset(self._again, [self._random[i] for i in self._again])
+            self._ends[self._again] = self._now + self._limit
+            robots.lost[self._again], robots.rewards[self._again] = False, 0.0
+        truncated = (self._ends <= self._now) & ~robots.lost
+        ended = robots.lost | truncated
+        self._again = ended.nonzero()[0].tolist()
+        self._active = ~ended
+        return robots.observations.copy(), robots.rewards.copy(), robots.lost.copy(), truncated, {}

@@ -13,17 +13,12 @@
 
 #include "app/cli/errors.hpp"
 #include "app/design/analysis.hpp"
-#include "app/sim/workers.hpp"
 #include "equipoise/config.hpp"
-#include "python/simulation.hpp"
-
-namespace nb = nanobind;
+#include "python/episodes.hpp"
 
 namespace equipoise::python {
 
 namespace {
-
-using Array = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>;
 
 /// Ctrl-C, and who wants to know how far a run is: now and then, by the wall clock.
 class Attention {
@@ -130,88 +125,6 @@ nb::tuple run(app::SimRequest request, const nb::object& controller, const nb::o
   attention.rethrow();
   return nb::make_tuple(json, recorder ? nb::object(columns_of(*recorder)) : nb::none());
 }
-
-/// Robots that are reset and stepped together, on several threads.
-class Episodes {
- public:
-  using Flags = nb::ndarray<bool, nb::numpy, nb::ndim<1>>;
-
-  Episodes(const app::SimRequest& request, int count, int jobs)
-      : request_(request),
-        robot_(simulated(robot_type(request.config))),
-        make_((app::check(request), robot_.episodes(request))),
-        episodes_(static_cast<std::size_t>(count)),
-        workers_(std::min(app::threads_for(jobs), static_cast<unsigned>(std::max(count, 1)))) {}
-
-  Episodes(const Episodes&) = delete;
-  Episodes& operator=(const Episodes&) = delete;
-
-  int count() const { return static_cast<int>(episodes_.size()); }
-  const Simulated& robot() const { return robot_; }
-
-  /// `numbers`, unless empty: of others of the population than configured. Their rows of `observations` are
-  /// written.
-  void reset(const std::vector<int>& which, const std::vector<std::uint64_t>& seeds,
-             const std::vector<std::int64_t>& numbers, const Array& observations) {
-    check(observations, width(), "observations");
-    if (seeds.size() != which.size() || (!numbers.empty() && numbers.size() != which.size()))
-      throw nb::value_error("every episode that is reset has a seed, and a robot or none has");
-    for (const int i : which) (void)at(i);
-    const nb::gil_scoped_release others;
-    workers_.each(static_cast<int>(which.size()), [&](int job) {
-      const auto k = static_cast<std::size_t>(job);
-      at(which[k]) = (numbers.empty() ? make_ : makes(numbers[k]))(seeds[k]);
-      at(which[k])->observation(row(observations, which[k]));
-    });
-  }
-  /// Those of `active` are stepped; `lost` and their rows of `observations` are written.
-  void step(const Array& actions, const Array& observations, const Flags& lost, const Flags& active) {
-    check(actions, robot_.wheels(), "actions");
-    check(observations, width(), "observations");
-    if (static_cast<int>(lost.shape(0)) != count() || static_cast<int>(active.shape(0)) != count())
-      throw nb::value_error("lost and active have an element per episode");
-    const nb::gil_scoped_release others;
-    workers_.each(count(), [&](int i) {
-      if (!active(i)) return;
-      lost(i) = !at(i)->step(actions.data() + std::ptrdiff_t{i} * robot_.wheels());
-      at(i)->observation(row(observations, i));
-    });
-  }
-  StateView truth(int i) { return at(i)->truth(); }
-
- private:
-  using Make = std::function<std::unique_ptr<Episode>(std::uint64_t)>;
-
-  Make makes(std::int64_t number) const {
-    if (number == request_.robot) return make_;
-    app::SimRequest request = request_;
-    request.robot = number;
-    app::check(request);
-    return robot_.episodes(request);
-  }
-  int width() const { return width_; }
-  double* row(const Array& observations, int i) const {
-    return &observations.data()[std::ptrdiff_t{i} * width()];
-  }
-  void check(const Array& array, int columns, const char* name) const {
-    if (array.ndim() != 2 || static_cast<int>(array.shape(0)) != count() ||
-        static_cast<int>(array.shape(1)) != columns)
-      throw nb::value_error((std::string(name) + ": expected " + std::to_string(count()) + " rows of " +
-                             std::to_string(columns) + " numbers")
-                                .c_str());
-  }
-  std::unique_ptr<Episode>& at(int i) {
-    if (i < 0 || i >= count()) throw nb::index_error("no such episode");
-    return episodes_[static_cast<std::size_t>(i)];
-  }
-
-  app::SimRequest request_;
-  const Simulated& robot_;
-  Make make_;
-  int width_ = static_cast<int>(robot_.observation_names().size());
-  std::vector<std::unique_ptr<Episode>> episodes_;
-  app::Workers workers_;  // gone first
-};
 
 /// Raw samples of a log, field by field, as SI.
 nb::ndarray<nb::numpy, double, nb::ndim<2>> calibrated(const std::string& type, const std::string& toml,
@@ -356,19 +269,21 @@ NB_MODULE(_core, m) {
   m.def(
       "error_names", [](const std::string& type) { return simulated(type).error_names(); }, nb::arg("robot"),
       "of ControllerTick.error");
+  m.def(
+      "observation_names", [](const std::string& type) { return simulated(type).observation_names(); },
+      nb::arg("robot"), "of a row of Episodes' observations");
   m.def("calibrated", &calibrated, nb::arg("robot"), nb::arg("config_toml"), nb::arg("gyro"),
         nb::arg("accel"), nb::arg("encoders"), nb::arg("battery"), nb::arg("attitude"),
         "per sample: gyro (3), accelerometer (3), attitude (3), battery, wheel angles");
   nb::class_<Episodes>(m, "Episodes", "Robots that are stepped together.")
-      .def(nb::init<const app::SimRequest&, int, int>(), nb::arg("request"), nb::arg("count"),
-           nb::arg("jobs"))
+      .def(nb::init<const app::SimRequest&, int, int, std::vector<double>, double>(), nb::arg("request"),
+           nb::arg("count"), nb::arg("jobs"), nb::arg("weights"), nb::arg("action_cost"))
       .def_prop_ro("count", &Episodes::count)
-      .def_prop_ro("wheels", [](const Episodes& e) { return e.robot().wheels(); })
-      .def_prop_ro("observation_names", [](const Episodes& e) { return e.robot().observation_names(); })
+      .def_prop_ro("wheels", &Episodes::wheels)
       .def("reset", &Episodes::reset, nb::arg("which"), nb::arg("seeds"), nb::arg("robot_numbers"),
            nb::arg("observations"))
-      .def("step", &Episodes::step, nb::arg("actions"), nb::arg("observations"), nb::arg("lost"),
-           nb::arg("active"))
+      .def("step", &Episodes::step, nb::arg("actions"), nb::arg("active"), nb::arg("observations"),
+           nb::arg("rewards"), nb::arg("lost"))
       .def("truth", &Episodes::truth, nb::arg("index"));
 }
 

@@ -13,13 +13,13 @@ struct MbbrAccess {
   static std::vector<std::string> reference_names() {
     return {"reference_phi_dot_x", "reference_phi_dot_y", "reference_yaw_rate"};
   }
-  static Eigen::VectorXd error(const MbbrReference& r) {
-    Eigen::VectorXd e(10);
+  static Vec<10> error(const MbbrReference& r) {
+    Vec<10> e;
     e << r.d_theta, r.d_rate, r.d_phi, r.d_phi_dot, r.d_theta_z, r.d_yaw_rate;
     return e;
   }
-  static Eigen::VectorXd wanted(const MbbrReference& r) {
-    Eigen::VectorXd w(3);
+  static Vec3 wanted(const MbbrReference& r) {
+    Vec3 w;
     w << r.phi_dot_star, r.yaw_rate;
     return w;
   }

@@ -10,12 +10,12 @@ struct MipAccess {
     return {"theta", "theta_dot", "phi", "phi_dot", "psi", "psi_dot"};
   }
   static std::vector<std::string> reference_names() { return {"reference_phi_dot", "reference_psi_dot"}; }
-  static Eigen::VectorXd error(const MipReference& r) {
-    Eigen::VectorXd e(6);
+  static Vec<6> error(const MipReference& r) {
+    Vec<6> e;
     e << r.d_theta, r.d_theta_dot, r.d_phi, r.d_phi_dot, r.d_psi, r.d_psi_dot;
     return e;
   }
-  static Eigen::VectorXd wanted(const MipReference& r) { return Vec2(r.phi_dot, r.psi_dot); }
+  static Vec2 wanted(const MipReference& r) { return {r.phi_dot, r.psi_dot}; }
   static MipEstimate estimate(const StateView& v, const MipParameters&) {
     MipEstimate x;
     x.theta = v.theta_rad.x();

@@ -140,8 +140,8 @@ class SimulatedOf : public Simulated {
       return run_.step();
     }
     void observation(double* out) const override {
-      const Eigen::VectorXd error = Access::error(reference_);
-      const Eigen::VectorXd wanted = Access::wanted(reference_);
+      const auto error = Access::error(reference_);
+      const auto wanted = Access::wanted(reference_);
       out = std::copy(error.begin(), error.end(), out);
       std::copy(wanted.begin(), wanted.end(), out);
     }
@@ -157,7 +157,7 @@ class SimulatedOf : public Simulated {
     app::Hooked<Own> pipeline_;
     app::TickObserver observe_;
     std::atomic<bool> stop_{false};
-    app::SimulatedRun<Firmware, World, app::Hooked<Own>> run_;
+    app::SimulatedRun<Firmware, World, app::Hooked<Own>, app::Figures::kNone> run_;
   };
 };
 

@@ -234,6 +234,27 @@ def test_a_policy_keeps_the_robot_up_and_none_lets_it_fall(root):
     assert abs(env.unwrapped.truth.theta_rad[0]) > 0.05
 
 
+def test_actions_are_limited_and_the_reward_is_1_less_squared_errors_and_drive():
+    gymnasium = pytest.importorskip("gymnasium")
+    env = gymnasium.make("equipoise_robot.envs:Equipoise-Mbbr-v0").unwrapped
+    env.reset(seed=2)
+    for drive in ([0.1, -0.2, 0.3], [2.0, -0.3, 0.1]):
+        observation, reward, lost, _, _ = env.step(np.array(drive))
+        error = dict(zip(env.observation_names, observation, strict=True))
+        costs = [
+            (error[f"theta_{axis}"] / 0.1) ** 2 + (error[f"phi_dot_{axis}"] / 10.0) ** 2 for axis in "xy"
+        ]
+        cost = sum(costs) + (error["yaw_rate"] / 5.0) ** 2 + 0.05 * sum(min(d, 1.0) ** 2 for d in drive)
+        assert not lost
+        assert 0.0 < cost < 1.0
+        assert reward == pytest.approx(1.0 - cost, abs=1e-12)
+    states = []
+    for largest in (1.0, 7.0):
+        env.reset(seed=2)
+        states.append([env.step(np.array([largest, -largest, 0.0]))[0] for _ in range(3)])
+    np.testing.assert_array_equal(*states)
+
+
 def test_vectorised_steps_are_the_single_ones():
     gymnasium = pytest.importorskip("gymnasium")
     envs = gymnasium.make_vec("equipoise_robot.envs:Equipoise-Mip-v0", num_envs=3, max_episode_steps=50)

@@ -1,6 +1,6 @@
 // One run in the simulated world, tick by tick: world, hardware boundary, loop, pipeline and meter. In:
 // world, pipeline, options -> out: summary. The body of simulate(). Included by simulate_*.cpp and by what
-// steps a robot from outside (src/python) only.
+// steps a robot from outside (src/python), which reads no figures and pays for none, only.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,9 @@
 
 namespace equipoise::app {
 
-template <class Firmware, class World, class Pipeline>
+enum class Figures { kWanted, kNone };
+
+template <class Firmware, class World, class Pipeline, Figures kFigures = Figures::kWanted>
 class SimulatedRun {
  public:
   /// World, pipeline, observer and stop must outlive it.
@@ -75,13 +77,13 @@ class SimulatedRun {
                   const Result& t) { observe(tick, now_ns, raw, command, t); };
   }
 
-  void observe(std::int64_t tick, std::int64_t now_ns, const RawSample& raw, const Command& command,
-               const Result& t) {
+  void observe([[maybe_unused]] std::int64_t tick, [[maybe_unused]] std::int64_t now_ns,
+               [[maybe_unused]] const RawSample& raw, const Command& command, const Result& t) {
     const auto& robot = pipeline_.params().robot;
     const auto truth = world_.truth();
     const StateView truth_view = view(truth, robot);
     const double time_s = world_.time_s();
-    measure(t, truth, truth_view, time_s);
+    if constexpr (kFigures == Figures::kWanted) measure(t, truth, truth_view, time_s);
     judge_.observe({time_s, command.arm, t.arm_state == ArmState::kArmed, t.reasons,
                     truth_view.theta_rad.template head<2>().norm()});
     if (lost()) done_ = true;

@@ -1,10 +1,13 @@
 // Threads that stay: the same job for 0 .. n-1, again and again, thousands of times a second. In: count, job
-// -> out: all done when each() returns; the first exception ends the rest and is thrown again. Jobs that
-// share nothing give the same results with any number of threads. One caller at a time.
+// -> out: all done when each() returns; the first exception ends the rest and is thrown again. Each thread
+// has its own share of the numbers, the same in every round, so that its cache keeps what belongs to them;
+// who is done takes from the others' shares. Jobs that share nothing give the same results with any number of
+// threads. One caller at a time.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
@@ -23,8 +26,8 @@ inline unsigned threads_for(int jobs) {
 class Workers {
  public:
   /// `threads`: with the caller's, which works, too.
-  explicit Workers(unsigned threads) {
-    for (unsigned i = 1; i < threads; ++i) others_.emplace_back([this] { serve(); });
+  explicit Workers(unsigned threads) : shares_(std::max(threads, 1U)) {
+    for (std::size_t i = 1; i < shares_.size(); ++i) others_.emplace_back([this, i] { serve(i); });
   }
   ~Workers() {
     {
@@ -38,61 +41,128 @@ class Workers {
   Workers& operator=(const Workers&) = delete;
 
   void each(int count, const std::function<void(int)>& job) {
-    {
-      const std::lock_guard lock(mutex_);
-      job_ = &job;
-      next_ = 0;
-      count_ = count;
-      failure_ = nullptr;
-      ++round_;
+    const auto threads = static_cast<std::int64_t>(shares_.size());
+    for (std::int64_t i = 0; i < threads; ++i) {
+      Share& share = shares_[static_cast<std::size_t>(i)];
+      share.next = static_cast<int>(count * i / threads);
+      share.end = static_cast<int>(count * (i + 1) / threads);
     }
-    if (count > 1) news_.notify_all();
-    work(job);
-    std::unique_lock lock(mutex_);
-    job_ = nullptr;  // who wakes up now is too late
-    idle_.wait(lock, [this] { return working_ == 0; });
+    job_ = &job;
+    failure_ = nullptr;
+    failed_ = false;
+    if (count > 1) open();
+    work(0);
+    close();
     if (failure_) std::rethrow_exception(failure_);
   }
 
  private:
-  void work(const std::function<void(int)>& job) noexcept {
-    for (int i = next_++; i < count_; i = next_++) {
-      try {
-        job(i);
-      } catch (...) {
-        const std::lock_guard lock(mutex_);
-        if (!failure_) failure_ = std::current_exception();
-        next_ = count_;
+  using Clock = std::chrono::steady_clock;
+
+  /// Of one thread; on a cache line of its own.
+  struct alignas(64) Share {
+    std::atomic<int> next{0};
+    int end = 0;
+  };
+
+  // What state_ counts: rounds, threads at work beside the caller, and whether more may join them.
+  static constexpr std::uint64_t kOpen = 1;
+  static constexpr std::uint64_t kOneAtWork = 2;
+  static constexpr std::uint64_t kOneRound = 1U << 16U;
+
+  /// For so long a thread stays awake: to be woken takes as long as many a job, and a caller that steps
+  /// robots comes back soon.
+  static constexpr std::chrono::microseconds kAwake{200};
+
+  template <class Condition>
+  static bool soon(const Condition& condition) {
+    if (condition()) return true;
+    for (const auto end = Clock::now() + kAwake; Clock::now() < end;) {
+      std::this_thread::yield();
+      if (condition()) return true;
+    }
+    return false;
+  }
+
+  void open() {
+    state_ += kOneRound + kOpen;
+    if (asleep_ == 0) return;
+    const std::lock_guard lock(mutex_);
+    news_.notify_all();
+  }
+
+  /// Who comes now is too late; who is at work is waited for.
+  void close() {
+    state_ &= ~kOpen;
+    const auto idle = [this] { return state_ % kOneRound == 0; };
+    if (soon(idle)) return;
+    std::unique_lock lock(mutex_);
+    caller_sleeps_ = true;
+    idle_.wait(lock, idle);
+    caller_sleeps_ = false;
+  }
+
+  /// True once per round, while it is open.
+  bool join(std::uint64_t* seen) {
+    std::uint64_t state = state_;
+    while ((state & kOpen) != 0 && state / kOneRound != *seen) {
+      if (!state_.compare_exchange_weak(state, state + kOneAtWork)) continue;
+      *seen = state / kOneRound;
+      return true;
+    }
+    return false;
+  }
+
+  void leave() {
+    state_ -= kOneAtWork;
+    if (!caller_sleeps_) return;
+    const std::lock_guard lock(mutex_);
+    idle_.notify_one();
+  }
+
+  void work(std::size_t self) noexcept {
+    for (std::size_t k = 0; k < shares_.size(); ++k) {
+      Share& share = shares_[(self + k) % shares_.size()];
+      for (int i = share.next++; i < share.end && !failed_; i = share.next++) {
+        try {
+          (*job_)(i);
+        } catch (...) {
+          const std::lock_guard lock(mutex_);
+          if (!failure_) failure_ = std::current_exception();
+          failed_ = true;
+        }
       }
     }
   }
 
-  void serve() {
+  void serve(std::size_t self) {
     std::uint64_t seen = 0;
-    std::unique_lock lock(mutex_);
     for (;;) {
-      news_.wait(lock, [&] { return closing_ || (job_ != nullptr && round_ != seen); });
-      if (closing_) return;
-      seen = round_;
-      const std::function<void(int)>& job = *job_;
-      ++working_;
-      lock.unlock();
-      work(job);
-      lock.lock();
-      if (--working_ == 0) idle_.notify_one();
+      bool joined = false;
+      const auto called = [&] { return (joined = join(&seen)) || closing_; };
+      if (!soon(called)) {
+        std::unique_lock lock(mutex_);
+        ++asleep_;
+        news_.wait(lock, called);
+        --asleep_;
+      }
+      if (!joined) return;
+      work(self);
+      leave();
     }
   }
 
+  std::vector<Share> shares_;
   std::vector<std::thread> others_;
+  std::atomic<std::uint64_t> state_{0};
+  const std::function<void(int)>* job_ = nullptr;
+  std::atomic<bool> failed_{false};
+  std::exception_ptr failure_;
   std::mutex mutex_;
   std::condition_variable news_, idle_;
-  const std::function<void(int)>* job_ = nullptr;
-  std::atomic<int> next_{0};
-  int count_ = 0;
-  int working_ = 0;  // of the others
-  std::uint64_t round_ = 0;
-  bool closing_ = false;
-  std::exception_ptr failure_;
+  std::atomic<int> asleep_{0};
+  std::atomic<bool> caller_sleeps_{false};
+  std::atomic<bool> closing_{false};
 };
 
 }  // namespace equipoise::app

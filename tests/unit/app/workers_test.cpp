@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
+#include <chrono>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -33,6 +35,45 @@ TEST(Workers, ThrowTheFirstFailureAndWorkOn) {
   std::atomic<int> sum{0};
   workers.each(5, [&](int i) { sum += i; });
   EXPECT_EQ(sum, 10);
+}
+
+/// Returns when it has been called by two threads.
+class Meeting {
+ public:
+  void attend() {
+    for (++here_; here_ < 2;) std::this_thread::yield();
+  }
+
+ private:
+  std::atomic<int> here_{0};
+};
+
+TEST(Workers, WakeUpAfterALongPauseAndKeepTheirShares) {
+  Workers workers(2);
+  const auto here = std::this_thread::get_id();
+  for (int round = 0; round < 20; ++round) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));  // now they sleep
+    std::array<Meeting, 2> meetings;
+    workers.each(4, [&](int i) {
+      meetings[static_cast<std::size_t>(i % 2)].attend();
+      EXPECT_EQ(std::this_thread::get_id() == here, i < 2);
+    });
+  }
+}
+
+TEST(Workers, AreWaitedForHoweverLongTheyTake) {
+  Workers workers(2);
+  for (int round = 0; round < 20; ++round) {
+    Meeting meeting;
+    std::atomic<bool> done{false};
+    workers.each(2, [&](int i) {
+      meeting.attend();
+      if (i == 0) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // now the caller sleeps
+      done = true;
+    });
+    EXPECT_TRUE(done);
+  }
 }
 
 TEST(Workers, OneThreadIsTheCallers) {
