@@ -92,23 +92,22 @@ void LogWriter::preamble(std::int64_t utime, std::string_view channel,
   preamble_utime_ = utime;
   preamble_channel_ = channel;
   preamble_ = data;
-  event(utime, channel, data);
+  std::memcpy(event(utime, channel, data.size()), data.data(), data.size());
   write_out();
 }
 
-void LogWriter::event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data) {
-  if (!is_open()) return;
+std::uint8_t* LogWriter::event(std::int64_t utime, std::string_view channel, std::size_t size) {
   const std::size_t before = used_;
-  used_ += kHeaderBytes + channel.size() + data.size();
+  used_ += kHeaderBytes + channel.size() + size;
   if (used_ > tick_.size()) tick_.resize(2 * used_);
   std::uint8_t* at = tick_.data() + before;
   at = store_big_endian(kSync, at);
   at = store_big_endian(static_cast<std::uint64_t>(event_number_++), at);
   at = store_big_endian(static_cast<std::uint64_t>(utime), at);
   at = store_big_endian(static_cast<std::uint32_t>(channel.size()), at);
-  at = store_big_endian(static_cast<std::uint32_t>(data.size()), at);
+  at = store_big_endian(static_cast<std::uint32_t>(size), at);
   std::memcpy(at, channel.data(), channel.size());
-  std::copy(data.begin(), data.end(), at + channel.size());
+  return at + channel.size();
 }
 
 void LogWriter::end_tick() {

@@ -55,12 +55,7 @@ class Telemetry::Writer {
   Writer& operator=(const Writer&) = delete;
 
   void write(const TickRecord& r) {
-    const auto now = std::chrono::steady_clock::now();
-    publish_now_ = lcm_ != nullptr && now >= next_publish_;
-    if (publish_now_) {
-      next_publish_ = now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-                                std::chrono::duration<double>(1.0 / options_.max_publish_hz));
-    }
+    publish_now_ = lcm_ != nullptr && publish_due();
     utime_ = r.now_ns / 1000;
     tick_ = r.tick;
     fields::each_message(
@@ -87,16 +82,31 @@ class Telemetry::Writer {
   }
 
  private:
+  bool publish_due() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_publish_) return false;
+    next_publish_ = now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                              std::chrono::duration<double>(1.0 / options_.max_publish_hz));
+    return true;
+  }
+
+  /// Encoded where it lies in the log, and published from there.
   template <class Message, class Record>
   void emit(Message message, const char* channel, const Record& record) {
     if (!log_.is_open() && !publish_now_) return;  // nobody would read it
-    encode(message, record, utime_, tick_, &buffer_);
-    log_.event(utime_, channel, buffer_);
-    if (publish_now_) publish(channel);
+    const std::size_t size = encoded_size(message, record);
+    if (log_.is_open()) {
+      std::uint8_t* const data = log_.event(utime_, channel, size);
+      encode(message, record, utime_, tick_, data);
+      if (publish_now_) publish(channel, data, size);
+    } else {
+      encode(message, record, utime_, tick_, &buffer_);
+      publish(channel, buffer_.data(), size);
+    }
   }
 
-  void publish(const char* channel) {
-    lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned>(buffer_.size()));
+  void publish(const char* channel, const std::uint8_t* data, std::size_t size) {
+    lcm_publish(lcm_, channel, data, static_cast<unsigned>(size));
   }
 
   void note_failure() {
@@ -107,8 +117,8 @@ class Telemetry::Writer {
 
   void announce(const RunInfo& run) {
     encode(fields::Run{}, run, utime_, tick_, &buffer_);
-    log_.preamble(utime_, fields::kRunChannel, buffer_);
-    if (lcm_ != nullptr) publish(fields::kRunChannel);
+    if (log_.is_open()) log_.preamble(utime_, fields::kRunChannel, buffer_);
+    if (lcm_ != nullptr) publish(fields::kRunChannel, buffer_.data(), buffer_.size());
   }
 
   /// Once a second of ticks.
@@ -156,12 +166,12 @@ void Telemetry::hand_over(const TickRecord& record) noexcept {
 }
 
 void Telemetry::run() {
-  TickRecord record;
   for (;;) {
     const bool stopping = stop_.load(std::memory_order_acquire);
     bool any = false;
-    while (queue_.pop(&record)) {
-      writer_->write(record);
+    while (const TickRecord* record = queue_.front()) {
+      writer_->write(*record);
+      queue_.drop();
       any = true;
     }
     if (stopping) break;

@@ -16,6 +16,7 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ TICK_S = 0.005
 STEPS_PER_TICK = 5  # world.step_s: 1 ms
 MUJOCO_STEPS, MUJOCO_EPISODE = 20000, 400  # a robot that is left alone falls; at 0.4 s it starts again
 BATCH, BATCH_TICKS = 64, 1500
-CAMPAIGN = ["--robots", "5", "--fault", "imu_gap_100ms", "encoder_dead", "--phase", "balancing", "driving"]
+CAMPAIGN = ["--robots", "40", "--fault", "imu_gap_100ms", "encoder_dead", "--phase", "balancing", "driving"]
 
 
 def child(command: list[str], root: Path) -> tuple[float, float]:
@@ -48,17 +49,18 @@ def child(command: list[str], root: Path) -> tuple[float, float]:
     return usage.ru_utime + usage.ru_stime, time.monotonic() - began
 
 
-def simulated(root: Path, robot: str, fidelity: str, duration_s: float) -> list[str]:
+def simulated(root: Path, robot: str, fidelity: str, duration_s: float, drives: bool = True) -> list[str]:
+    yaw_hz, drive_mps = ("1" if robot == "mbbr" else "0", "0.2") if drives else ("0", "0")
     return [
         str(root / "build/host/equipoise"),
         *("sim", "--config", ROBOTS[robot], "--fidelity", fidelity, "--log", "off", "--telemetry", "off"),
-        *("--duration-s", str(duration_s), "--yaw-hz", "1" if robot == "mbbr" else "0", "--drive-mps", "0.2"),
+        *("--duration-s", str(duration_s), "--yaw-hz", yaw_hz, "--drive-mps", drive_mps),
     ]
 
 
-def closed_loop(root: Path, robot: str, fidelity: str) -> float:
+def closed_loop(root: Path, robot: str, fidelity: str, drives: bool = True) -> float:
     """Simulated seconds per CPU second: plant at 1 kHz, sensors, the whole firmware at 200 Hz."""
-    long, short = (child(simulated(root, robot, fidelity, t), root)[0] for t in (LONG_S, SHORT_S))
+    long, short = (child(simulated(root, robot, fidelity, t, drives), root)[0] for t in (LONG_S, SHORT_S))
     return (LONG_S - SHORT_S) / (long - short)
 
 
@@ -134,11 +136,23 @@ def batch(root: Path, robot: str) -> float:
     return BATCH * BATCH_TICKS * TICK_S / spent
 
 
-def cores(root: Path) -> float:
-    """Wall time of a campaign on one core over that on two."""
-    command = [str(root / "build/host/equipoise"), "campaign", "--config", ROBOTS["mbbr"], *CAMPAIGN]
-    one, two = (child([*command, "--jobs", n], root)[1] for n in ("1", "2"))
-    return one / two
+def cores(root: Path) -> dict[str, float]:
+    """Wall time of a campaign on one core over that on two; what the machine itself gives, by campaigns on
+    one core that know nothing of each other, two at a time; the first over the second: ours alone."""
+    command = [
+        str(root / "build/host/equipoise"),
+        "campaign",
+        "--config",
+        ROBOTS["mbbr"],
+        *CAMPAIGN,
+        "--jobs",
+    ]
+    one, two = (child([*command, n], root)[1] for n in ("1", "2"))
+    began = time.monotonic()
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda n: child([*command, n], root), ("1", "1")))
+    ours, machine = one / two, 2.0 * one / (time.monotonic() - began)
+    return {"cores": ours, "cores of the machine": machine, "cores over the machine's": ours / machine}
 
 
 def start_ms(root: Path) -> float:
@@ -182,12 +196,14 @@ def filter_code(root: Path, build: str, nm: str) -> dict[str, int] | None:
 
 
 def measure(root: Path, rounds: int, say: Callable[[str], None]) -> dict:
-    parts: dict[str, Callable[[], float]] = {
+    parts: dict[str, Callable[[], float | dict[str, float]]] = {
         f"closed_loop {robot} {fidelity}": lambda r=robot, f=fidelity: closed_loop(root, r, f)
         for robot in ROBOTS
         for fidelity in ("nominal", "full")
     }
-    parts |= {f"batch {r}": lambda r=r: batch(root, r) for r in ROBOTS}
+    for robot in ROBOTS:
+        parts[f"standing {robot}"] = lambda r=robot: closed_loop(root, r, "nominal", drives=False)
+        parts[f"batch {robot}"] = lambda r=robot: batch(root, r)
     parts |= {f"plant {f}": lambda f=f: plant(root, f) for f in ("ideal", "full")}
     parts |= {
         "mujoco": mujoco,
@@ -195,20 +211,27 @@ def measure(root: Path, rounds: int, say: Callable[[str], None]) -> dict:
         "start_ms": lambda: start_ms(root),
         "memory_MB": lambda: memory_MB(root),
     }
-    found: dict[str, list[float]] = {name: [] for name in parts}
+    found: dict[str, list[float]] = {key: [] for key, *_ in ROWS}
     missing: dict[str, str] = {}
     for k in range(rounds):
         for name, part in parts.items():
             if name in missing:
                 continue
             try:
-                found[name].append(part())
+                value = part()
+                for key, each in (value if isinstance(value, dict) else {name: value}).items():
+                    found[key].append(each)
             except (UserError, ImportError) as problem:
                 missing[name] = str(problem).splitlines()[-1]
         say(f"round {k + 1} of {rounds}")
     for f in ("ideal", "full"):
         ours, theirs = found[f"plant {f}"], found["mujoco"]
         found[f"plant over mujoco {f}"] = [a / b for a, b in zip(ours, theirs, strict=False)]
+    for robot in ROBOTS:
+        together, alone = found[f"batch {robot}"], found[f"standing {robot}"]
+        found[f"batch over loops {robot}"] = [
+            a / (b * (os.cpu_count() or 1)) for a, b in zip(together, alone, strict=False)
+        ]
     result: dict = {
         name: {"median": statistics.median(v), "least": min(v), "most": max(v)} if v else None
         for name, v in found.items()
@@ -228,14 +251,20 @@ ROWS = [
     ("closed_loop mbbr full", "closed loop, MBBR, `full`", "x real time", 0),
     ("closed_loop mip nominal", "closed loop, eduMIP, `nominal`", "x real time", 0),
     ("closed_loop mip full", "closed loop, eduMIP, `full`", "x real time", 0),
+    ("standing mbbr", "closed loop, MBBR, `nominal`, standing", "x real time", 0),
+    ("standing mip", "closed loop, eduMIP, `nominal`, standing", "x real time", 0),
     ("batch mbbr", f"{BATCH} MBBRs in one Gymnasium call, on all cores, wall time", "x real time", 0),
     ("batch mip", f"{BATCH} eduMIPs in one Gymnasium call, on all cores, wall time", "x real time", 0),
+    ("batch over loops mbbr", "the former over as many standing closed loops as cores, MBBR", "x", 2),
+    ("batch over loops mip", "the former over as many standing closed loops as cores, eduMIP", "x", 2),
     ("plant ideal", "plant alone, `ideal`", "steps/s", -3),
     ("plant full", "plant alone, `full`", "steps/s", -3),
     ("mujoco", "MuJoCo, body and ball on the floor", "steps/s", -3),
     ("plant over mujoco ideal", "plant, `ideal`, over MuJoCo", "x", 2),
     ("plant over mujoco full", "plant, `full`, over MuJoCo", "x", 2),
     ("cores", "campaign on two cores over one, wall time", "x", 2),
+    ("cores of the machine", "two campaigns on a core each, over one: what the machine gives", "x", 2),
+    ("cores over the machine's", "the first over the second: what is ours", "x", 2),
     ("start_ms", "start, 0.1 s of simulation, end; wall time", "ms", 0),
     ("memory_MB", "resident memory of a simulation", "MB", 0),
 ]
@@ -268,9 +297,10 @@ def page(result: dict) -> str:
     lines += [
         "",
         "Closed loop: the plant at 1 kHz, sensors, the whole firmware at 200 Hz, log and telemetry off, "
-        "driving at 0.2 m/s, the MBBR turning at 1 Hz. The plant beside MuJoCo, 1 ms a step: ours rolls "
-        "without slip and has bridges, motors, gears and friction; MuJoCo's has a body and a ball with an "
-        "elliptic contact cone and no drive (tools/equipoise_tools/mujoco_client.py).",
+        "driving at 0.2 m/s, the MBBR turning at 1 Hz; standing, as the robots of a batch do, wheels stick "
+        "and slide in turn and their friction takes longer to solve. The plant beside MuJoCo, 1 ms a step: "
+        "ours rolls without slip and has bridges, motors, gears and friction; MuJoCo's has a body and a ball "
+        "with an elliptic contact cone and no drive (tools/equipoise_tools/mujoco_client.py).",
     ]
     for key, name in (("filter_bytes_x86", "x86-64"), ("filter_bytes_cortex_a8", "Cortex-A8")):
         sizes = result[key]

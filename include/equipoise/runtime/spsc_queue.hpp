@@ -1,6 +1,6 @@
 // Lock-free queue between one producer and one consumer; wait-free for both.
-// In: push(value) -> false if full, never blocks. Out: pop(value) -> false if empty. RT-safe: memory is
-// allocated at construction only.
+// In: push(value) -> false if full, never blocks. Out: front() -> the oldest, nullptr if empty; drop() frees
+// its place. RT-safe: memory is allocated at construction only.
 #pragma once
 
 #include <atomic>
@@ -29,16 +29,16 @@ class SpscQueue {
     return true;
   }
 
-  bool pop(T* value) noexcept {
+  /// The oldest value, where it lies until drop(); nullptr if there is none.
+  const T* front() noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail == head_seen_) {
       head_seen_ = head_.load(std::memory_order_acquire);
-      if (tail == head_seen_) return false;
+      if (tail == head_seen_) return nullptr;
     }
-    *value = slots_[tail & mask_];
-    tail_.store(tail + 1, std::memory_order_release);
-    return true;
+    return &slots_[tail & mask_];
   }
+  void drop() noexcept { tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
  private:
   static std::size_t round_up(std::size_t n) {

@@ -1,6 +1,6 @@
 // Records as LCM messages: fingerprint, utime, tick (where the type has one), then the fields in the order of
 // fields.hpp, big-endian. In: record -> out: bytes of a message; and back, false for bytes that are none of
-// this type and version. Encoding reuses the buffer's memory. Not for the tick.
+// this type and version. Not for the tick.
 #pragma once
 
 #include <algorithm>
@@ -15,6 +15,7 @@
 #include <equipoise/timing_histogram_t.hpp>
 #include <equipoise/timing_t.hpp>
 #include <equipoise/verdict_t.hpp>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -51,13 +52,36 @@ template <class T>
 using Unsigned = std::conditional_t<sizeof(T) == 8, std::uint64_t,
                                     std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint8_t>>;
 
-/// Writes from the beginning of `out`, which has the message's size once the encoder is gone.
+/// Of a text in a message: LCM's strings hold no zero but their last.
+inline std::size_t text_length(const std::string& text) { return std::min(text.find('\0'), text.size()); }
+
+/// Counts the bytes that Encoder writes; a constant where there is no text.
+class Sizer {
+ public:
+  template <class T>
+  void operator()(const char*, const char*, const T& value) {
+    put(value);
+  }
+  template <class T>
+  void put(const T& value) {
+    if constexpr (kIsScalar<T>) {
+      size_ += sizeof(Unsigned<T>);
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      size_ += sizeof(std::int32_t) + text_length(value) + 1;
+    } else {
+      size_ += std::size(value) * sizeof(Unsigned<std::decay_t<decltype(*std::begin(value))>>);
+    }
+  }
+  std::size_t size() const { return size_; }
+
+ private:
+  std::size_t size_ = 0;
+};
+
+/// Writes where there is room for it.
 class Encoder {
  public:
-  explicit Encoder(Bytes* out) : out_(*out) { out_.resize(kUsual); }
-  ~Encoder() { out_.resize(used_); }
-  Encoder(const Encoder&) = delete;
-  Encoder& operator=(const Encoder&) = delete;
+  explicit Encoder(std::uint8_t* to) : at_(to) {}
 
   template <class T>
   void operator()(const char*, const char*, const T& value) {
@@ -68,30 +92,20 @@ class Encoder {
     if constexpr (kIsScalar<T>) {
       Unsigned<T> bits{};
       std::memcpy(&bits, &value, sizeof value);
-      store_big_endian(bits, room(sizeof bits));
+      at_ = store_big_endian(bits, at_);
     } else if constexpr (std::is_same_v<T, std::string>) {
-      const std::size_t end = std::min(value.find('\0'), value.size());  // LCM's strings hold no zero
-      put(static_cast<std::int32_t>(end + 1));
-      std::uint8_t* const text = room(end + 1);
-      std::memcpy(text, value.data(), end);
-      text[end] = 0;
+      const std::size_t length = text_length(value);
+      put(static_cast<std::int32_t>(length + 1));
+      std::memcpy(at_, value.data(), length);
+      at_[length] = 0;
+      at_ += length + 1;
     } else {
       for (const auto& element : value) put(element);
     }
   }
 
  private:
-  static constexpr std::size_t kUsual = 256;  // bytes; most messages of a tick are shorter
-
-  std::uint8_t* room(std::size_t size) {
-    const std::size_t at = used_;
-    used_ += size;
-    if (used_ > out_.size()) out_.resize(2 * used_);
-    return out_.data() + at;
-  }
-
-  Bytes& out_;
-  std::size_t used_ = 0;
+  std::uint8_t* at_;
 };
 
 class Decoder {
@@ -145,13 +159,33 @@ class Decoder {
 
 }  // namespace wire
 
+/// All numbers of a message in their order.
+template <class Message, class Record, class Visit>
+void walk(Message message, const Record& record, std::int64_t utime, std::int64_t tick, Visit& visit) {
+  visit.put(fingerprint(message));
+  visit.put(utime);
+  if constexpr (kHasTick<Message>) visit.put(tick);
+  Message::visit(record, visit);
+}
+
+template <class Message, class Record>
+std::size_t encoded_size(Message message, const Record& record) {
+  wire::Sizer sizer;
+  walk(message, record, 0, 0, sizer);
+  return sizer.size();
+}
+
+/// `to`: room for encoded_size() bytes.
+template <class Message, class Record>
+void encode(Message message, const Record& record, std::int64_t utime, std::int64_t tick, std::uint8_t* to) {
+  wire::Encoder encoder(to);
+  walk(message, record, utime, tick, encoder);
+}
+
 template <class Message, class Record>
 void encode(Message message, const Record& record, std::int64_t utime, std::int64_t tick, Bytes* out) {
-  wire::Encoder encoder(out);
-  encoder.put(fingerprint(message));
-  encoder.put(utime);
-  if constexpr (kHasTick<Message>) encoder.put(tick);
-  Message::visit(record, encoder);
+  out->resize(encoded_size(message, record));
+  encode(message, record, utime, tick, out->data());
 }
 
 /// False, and `record` is undefined, unless these are the bytes of one such message. `tick` may stay as it

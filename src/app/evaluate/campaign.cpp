@@ -4,6 +4,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -193,14 +194,16 @@ std::string cell_of(const std::vector<FaultOutcome>& outcomes) {
 
 template <class Firmware>
 int campaign(const CampaignArguments& a) {
-  std::vector<typename Firmware::Config> configs;
-  configs.reserve(static_cast<std::size_t>(a.robots));
-  for (int r = 0; r < a.robots; ++r) configs.push_back(configured<Firmware>(a, a.robot + r));
+  // To configure a robot takes as long as a second of its run: on all threads, too.
+  std::vector<std::optional<typename Firmware::Config>> configs(static_cast<std::size_t>(a.robots));
+  Workers(threads_for(a.jobs)).each(a.robots, [&](int r) {
+    configs[static_cast<std::size_t>(r)] = configured<Firmware>(a, a.robot + r);
+  });
   const std::vector<Case> all = cases_of(a);
   const auto outcomes =
       in_parallel<FaultOutcome>("campaign", all.size(), threads_for(a.jobs), [&](std::size_t i) {
         const Case& c = all[i];
-        return one<Firmware>(configs[static_cast<std::size_t>(c.robot - a.robot)], a.fidelity, c.plan,
+        return one<Firmware>(*configs[static_cast<std::size_t>(c.robot - a.robot)], a.fidelity, c.plan,
                              c.seed);
       });
 
@@ -235,7 +238,7 @@ int campaign(const CampaignArguments& a) {
       std::to_string(cases.size()) + " fault x phase cases, " + std::to_string(unsafe) + " unsafe";
   std::string soak_runs;
   if (a.soak_h > 0.0) {
-    const Soak s = soak<Firmware>(configs[0], a.fidelity, a.soak_h, a.seed);
+    const Soak s = soak<Firmware>(*configs[0], a.fidelity, a.soak_h, a.seed);
     out["soak"] = {{"hours", s.hours},
                    {"runs", s.runs},
                    {"disarmed", s.disarmed},

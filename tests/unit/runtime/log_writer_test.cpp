@@ -6,6 +6,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -24,10 +25,14 @@ using testing::HasSubstr;
 
 class LogWriterTest : public LogFolder {
  protected:
+  static void write_event(LogWriter* log, std::int64_t utime, std::string_view channel,
+                          const std::vector<std::uint8_t>& data) {
+    std::copy(data.begin(), data.end(), log->event(utime, channel, data.size()));
+  }
   // Two events of 100 bytes.
   static void write_tick(LogWriter* log) {
-    log->event(0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
-    log->event(0, "CHANNEL2", std::vector<std::uint8_t>(100 - 28 - 8));
+    write_event(log, 0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
+    write_event(log, 0, "CHANNEL2", std::vector<std::uint8_t>(100 - 28 - 8));
     log->end_tick();
   }
   void write(const std::string& name, const std::string& text) const {
@@ -39,9 +44,9 @@ TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
   LogWriter log;
   ASSERT_TRUE(log.open(path_, {}));
   for (std::uintmax_t tick = 0; tick < 3; ++tick) {
-    log.event(0, "CHANNEL1", std::vector<std::uint8_t>(64));
+    write_event(&log, 0, "CHANNEL1", std::vector<std::uint8_t>(64));
     EXPECT_EQ(fs::file_size(path_), tick * 200);
-    log.event(0, "CHANNEL2", std::vector<std::uint8_t>(64));
+    write_event(&log, 0, "CHANNEL2", std::vector<std::uint8_t>(64));
     log.end_tick();
     EXPECT_EQ(fs::file_size(path_), (tick + 1) * 200);
   }
@@ -113,8 +118,8 @@ TEST_F(LogWriterTest, KeptLogsGoBeforeTheRunsOwnFilesWhenSpaceIsShort) {
 TEST_F(LogWriterTest, AnEventIsWhatLcmsLogsHold) {
   LogWriter log;
   ASSERT_TRUE(log.open(path_, {}));
-  log.event(1, "A", {0xAA});
-  log.event(0x0102030405060708, "CH", {0xBB, 0xCC, 0xDD});
+  write_event(&log, 1, "A", {0xAA});
+  write_event(&log, 0x0102030405060708, "CH", {0xBB, 0xCC, 0xDD});
   log.end_tick();
   std::string bytes;
   std::getline(std::ifstream(path_, std::ios::binary), bytes, '\n');
@@ -178,7 +183,7 @@ TEST_F(LogWriterTest, WhatWasNotYetWrittenIsWrittenAtTheEnd) {
   {
     LogWriter log;
     ASSERT_TRUE(log.open(path_, {}));
-    log.event(0, "CHANNEL1", std::vector<std::uint8_t>(64));
+    write_event(&log, 0, "CHANNEL1", std::vector<std::uint8_t>(64));
   }
   EXPECT_EQ(fs::file_size(path_), 100U);
 }

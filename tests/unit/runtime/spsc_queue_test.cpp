@@ -11,15 +11,19 @@ TEST(SpscQueue, RefusesWhenFullAndKeepsOrder) {
   SpscQueue<int> queue(4);
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.push(i));
   EXPECT_FALSE(queue.push(4));
-  int value = -1;
-  EXPECT_TRUE(queue.pop(&value));
-  EXPECT_EQ(value, 0);
-  EXPECT_TRUE(queue.push(4));
-  for (int i = 1; i <= 4; ++i) {
-    EXPECT_TRUE(queue.pop(&value));
-    EXPECT_EQ(value, i);
+  for (int i = 0; i <= 4; ++i) {
+    const int* oldest = queue.front();
+    ASSERT_NE(oldest, nullptr);
+    EXPECT_EQ(*oldest, i);
+    if (i == 0) {
+      EXPECT_FALSE(queue.push(4)) << "its place is free when it is dropped, not before";
+    }
+    queue.drop();
+    if (i == 0) {
+      EXPECT_TRUE(queue.push(4));
+    }
   }
-  EXPECT_FALSE(queue.pop(&value));
+  EXPECT_EQ(queue.front(), nullptr);
 }
 
 TEST(SpscQueue, NothingIsLostOrReorderedBetweenThreads) {
@@ -35,9 +39,9 @@ TEST(SpscQueue, NothingIsLostOrReorderedBetweenThreads) {
     }
   });
   for (int expected = 0; expected < kCount;) {
-    int value = -1;
-    if (queue.pop(&value)) {
-      ASSERT_EQ(value, expected);
+    if (const int* value = queue.front()) {
+      ASSERT_EQ(*value, expected);
+      queue.drop();
       ++expected;
     } else {
       std::this_thread::yield();
