@@ -4,19 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
-#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <thread>
 
 #include "equipoise/runtime/log_parts.hpp"
-#include "support/file_size_limit.hpp"
 #include "support/log_folder.hpp"
 
 namespace equipoise::runtime {
@@ -49,18 +44,6 @@ TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
     log.end_tick();
     EXPECT_EQ(fs::file_size(path_), (tick + 1) * 200);
   }
-}
-
-TEST_F(LogWriterTest, ADiskThatFillsUpInsideATickCostsTheWholeTick) {
-  LogWriter log;
-  ASSERT_TRUE(log.open(path_, {}));
-  {
-    const FileSizeLimit small(550);
-    for (int tick = 0; tick < 5; ++tick) write_tick(&log);
-  }
-  EXPECT_FALSE(log.is_open());
-  EXPECT_THAT(log.error(), HasSubstr("log stopped: File too large"));
-  EXPECT_EQ(fs::file_size(path_), 400U);
 }
 
 TEST_F(LogWriterTest, ALogOfTheSameNameIsReplacedWithAllItsPartsOrKept) {
@@ -99,19 +82,6 @@ TEST_F(LogWriterTest, ALogWhoseFurtherPartSomebodyWritesIsNotTaken) {
   close(writer);
   LogWriter free;
   EXPECT_TRUE(free.open(path_, {}));
-}
-
-TEST_F(LogWriterTest, KeptLogsGoBeforeTheRunsOwnFilesWhenSpaceIsShort) {
-  write("run.20200101T000000Z.lcm", "oldest");
-  write("run.20210101T000000Z.lcm", "old");
-  LogWriter log;
-  LogLimits limits;
-  limits.min_free_bytes = std::int64_t{1} << 60;  // no disk has as much
-  ASSERT_TRUE(log.open(path_, limits));
-  write_tick(&log);
-  EXPECT_TRUE(kept_logs(path_).empty());
-  EXPECT_THAT(log.error(), HasSubstr("No space left"));
-  EXPECT_EQ(fs::file_size(path_), 200U);
 }
 
 TEST_F(LogWriterTest, AnEventIsWhatLcmsLogsHold) {
@@ -154,49 +124,6 @@ TEST_F(LogWriterTest, ADeviceMayTakeTheLog) {
   EXPECT_THAT(full.error(), HasSubstr("log stopped: No space left on device"));
 }
 
-TEST_F(LogWriterTest, AFileThatCannotBeSyncedIsReported) {
-  LogLimits limits;
-  limits.sync = true;
-  LogWriter log;
-  ASSERT_TRUE(log.open("/dev/null", limits)) << log.error();
-  for (int i = 0; i < 10000 && log.error().empty(); ++i) {
-    write_tick(&log);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  EXPECT_THAT(log.error(), HasSubstr("log stopped: Invalid argument"));
-}
-
-TEST_F(LogWriterTest, WhatCannotBeSyncedAtTheEndIsReportedWhereSyncingWasAskedFor) {
-  LogLimits limits;
-  limits.sync = true;
-  LogWriter log;
-  ASSERT_TRUE(log.open("/dev/null", limits));
-  log.close();
-  EXPECT_THAT(log.error(), HasSubstr("log stopped: Invalid argument"));
-  LogWriter unsynced;
-  ASSERT_TRUE(unsynced.open("/dev/null", {}));
-  unsynced.close();
-  EXPECT_EQ(unsynced.error(), "");
-}
-
-TEST_F(LogWriterTest, AnEventThatCannotBeCutBackIsSaidToBeTorn) {
-  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
-  const int reader = open(path_.c_str(), O_RDONLY | O_NONBLOCK);
-  const auto before = std::signal(SIGPIPE, SIG_IGN);
-  LogWriter log;
-  ASSERT_TRUE(log.open(path_, {})) << log.error();
-  std::thread leaves([reader] {
-    for (int bytes = 0; ioctl(reader, FIONREAD, &bytes) == 0 && bytes == 0;)
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    close(reader);
-  });
-  log.event(0, "CHANNEL1", std::vector<std::uint8_t>(4 << 20));  // more than a pipe holds
-  log.end_tick();
-  leaves.join();
-  std::signal(SIGPIPE, before);
-  EXPECT_THAT(log.error(), HasSubstr("log stopped: Broken pipe; its last event is torn"));
-}
-
 TEST_F(LogWriterTest, EverybodyMayReadALogAndItsOwnerWritesIt) {
   const mode_t before = umask(0);
   LogWriter log;
@@ -225,21 +152,6 @@ TEST_F(LogWriterTest, AnEventMayBeLargerThanAllBeforeIt) {
   }
 }
 
-TEST_F(LogWriterTest, AnEarlierPartThatCannotBeOpenedOrRemovedIsNamedAsTheReason) {
-  write("run.lcm", "first");
-  fs::create_symlink("nowhere", folder_ / "run.0001.lcm");
-  LogWriter log;
-  EXPECT_FALSE(log.open(path_, {}));
-  EXPECT_THAT(log.error(), HasSubstr("run.lcm: log cannot be created: No such file or directory"));
-  EXPECT_EQ(fs::file_size(path_), 5U) << "and nothing is gone";
-
-  fs::remove(folder_ / "run.0001.lcm");
-  fs::create_directory(folder_ / "run.0001.lcm");
-  LogWriter second;
-  EXPECT_FALSE(second.open(path_, {}));
-  EXPECT_THAT(second.error(), HasSubstr("run.lcm: log cannot be created: Is a directory"));
-}
-
 TEST_F(LogWriterTest, AKeptLogIsNamedAfterTheEndOfItsLastPart) {
   constexpr timespec kEnds[] = {{1795311000, 0}, {1795311903, 0}};  // the second: 2026-11-22 01:45:03 UTC
   int part = 0;
@@ -255,30 +167,6 @@ TEST_F(LogWriterTest, AKeptLogIsNamedAfterTheEndOfItsLastPart) {
   ASSERT_TRUE(log.open(path_, limits));
   EXPECT_THAT(kept_logs(path_), ElementsAre((folder_ / "run.20261122T014503Z.lcm").string(),
                                             (folder_ / "run.20261122T014503Z.0001.lcm").string()));
-}
-
-TEST_F(LogWriterTest, WhereSpaceIsShortItsOwnFilesGoButTheLast) {
-  LogWriter log;
-  LogLimits limits;
-  limits.min_free_bytes = std::int64_t{1} << 60;  // no disk has as much
-  limits.max_bytes = 200;
-  ASSERT_TRUE(log.open(path_, limits));
-  write_tick(&log);
-  EXPECT_THAT(existing_log_parts(path_), ElementsAre(log_part(path_, 1)));
-  EXPECT_THAT(log.error(), HasSubstr("No space left"));
-}
-
-TEST_F(LogWriterTest, WhereSpaceIsEnoughNothingGoes) {
-  write("run.20200101T000000Z.lcm", "oldest");
-  LogWriter log;
-  LogLimits limits;
-  limits.min_free_bytes = 1;
-  limits.max_bytes = 200;
-  ASSERT_TRUE(log.open(path_, limits));
-  for (int tick = 0; tick < 3; ++tick) write_tick(&log);
-  EXPECT_EQ(existing_log_parts(path_).size(), 4U);
-  EXPECT_EQ(kept_logs(path_).size(), 1U);
-  EXPECT_EQ(log.error(), "");
 }
 
 TEST_F(LogWriterTest, AnotherProcessFindsTheLogLockedUntilItIsClosed) {
