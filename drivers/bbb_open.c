@@ -144,7 +144,6 @@ int bbb_open(const bbb_config_t* config, rio_t* out, bbb_error_t* error) {
   bbb->imu.i2c.fd = -1;
   bbb->battery.fd = -1;
   bbb->wheels = config->motors;
-  for (uint32_t i = 0; i < bbb->wheels; ++i) bbb->wheel[i].encoder.fd = -1;
   bbb->period_ns = 1000000000 / config->imu.rate_hz;
   bbb->late_after_ns = (int64_t)config->imu.late_after_us * 1000;
   bbb->battery_every_ticks = config->battery_every_ticks;

@@ -79,6 +79,6 @@ int eqep_read(eqep_t* encoder, int64_t* counts) {
 }
 
 void eqep_close(eqep_t* encoder) {
-  if (encoder->fd >= 0) close(encoder->fd);
+  if (encoder->modulus != 0 && encoder->fd >= 0) close(encoder->fd);
   encoder->fd = -1;
 }

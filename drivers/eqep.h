@@ -21,7 +21,7 @@ typedef struct eqep {
  * failed. */
 int eqep_open(eqep_t* encoder, const char* device);
 int eqep_read(eqep_t* encoder, int64_t* counts); /* -ERANGE: beyond the ceiling */
-void eqep_close(eqep_t* encoder);
+void eqep_close(eqep_t* encoder);                /* also of zeroed memory: closes nothing */
 
 /* Signed way from `last` to `now`, both modulo `modulus`, the shorter one. Pure. */
 int64_t eqep_difference(uint64_t last, uint64_t now, uint64_t modulus);

@@ -228,6 +228,80 @@ TEST(RunLog, ATickWithAMessageThatCannotBeReadIsLeftOut) {
   EXPECT_EQ(log.incomplete_ticks(), 1);
 }
 
+std::string message(const std::string& channel, const runtime::StateRecord& x, std::int64_t tick) {
+  Bytes bytes;
+  runtime::encode(fields::State{}, x, 5000 * tick, tick, &bytes);
+  return event(channel, bytes);
+}
+
+std::string end_message(std::int64_t tick) {
+  runtime::EndRecord end;
+  end.ended = 2;
+  end.duration_s = 4.5;
+  Bytes bytes;
+  runtime::encode(fields::End{}, end, 5000 * tick, tick, &bytes);
+  return event(fields::kEndChannel, bytes);
+}
+
+TEST(RunLog, AMessageOfAnotherTickBelongsToNone) {
+  RunLog log(run_event() + tick_events(0, "EQUIPOISE_REFERENCE") + message("EQUIPOISE_REFERENCE", {}, 9) +
+                 tick_events(1, fields::kTruthChannel) + message(fields::kTruthChannel, {}, 0) +
+                 message("EQUIPOISE_STATE_LATE", {}, 0) + end_message(0),
+             "a.lcm");
+  TickRecord tick;
+  ASSERT_TRUE(log.next(&tick));
+  EXPECT_EQ(tick.tick, 1);
+  EXPECT_FALSE(tick.has_truth);
+  EXPECT_EQ(tick.compared, 1U);
+  EXPECT_FALSE(log.next(&tick));
+  EXPECT_EQ(log.incomplete_ticks(), 1) << "the first, whose reference is another tick's";
+  EXPECT_THAT(log.estimators(), testing::ElementsAre("ekf13"));
+  EXPECT_FALSE(log.end());
+}
+
+TEST(RunLog, TheEndIsTheRunsOwnJudgement) {
+  RunLog log(run_event() + tick_events(0) + tick_events(1) + end_message(1), "a.lcm");
+  int ticks = 0;
+  for (TickRecord tick; log.next(&tick);) ++ticks;
+  EXPECT_EQ(ticks, 2);
+  ASSERT_TRUE(log.end());
+  EXPECT_EQ(log.end()->ended, 2);
+  EXPECT_EQ(log.end()->duration_s, 4.5);
+}
+
+TEST(RunLog, EachEstimatorKeepsItsPlaceAndOnlySoManyHaveOne) {
+  std::string bytes = run_event() + tick_events(0);
+  for (int i = 1; i < 10; ++i) {
+    runtime::StateRecord x{};
+    x.theta_rad[0] = i;
+    bytes += message("EQUIPOISE_STATE_E" + std::to_string(i), x, 0);
+  }
+  runtime::StateRecord second{};
+  second.theta_rad[0] = 20.0;
+  bytes += tick_events(1, "EQUIPOISE_STATE_EKF13") + message("EQUIPOISE_STATE_E2", second, 1);
+  RunLog log(bytes, "a.lcm");
+  TickRecord tick;
+  ASSERT_TRUE(log.next(&tick));
+  EXPECT_EQ(tick.compared, 0xFFU);
+  for (std::size_t i = 1; i < 8; ++i) EXPECT_EQ(tick.others[i].theta_rad[0], static_cast<double>(i));
+  ASSERT_TRUE(log.next(&tick));
+  EXPECT_EQ(tick.compared, 1U << 2U);
+  EXPECT_EQ(tick.others[2].theta_rad[0], 20.0);
+  EXPECT_THAT(log.estimators(), testing::ElementsAre("ekf13", "e1", "e2", "e3", "e4", "e5", "e6", "e7"));
+}
+
+// The first part of a log may be gone, and a run may be cut off.
+TEST(RunLog, ATickWithoutItsBeginningIsNoneAndOneWithoutItsEndIsIncomplete) {
+  const std::string sensors = fields::kSensorsChannel;
+  RunLog log(run_event() + tick_events(0, sensors) + tick_events(1) + tick_events(2, "EQUIPOISE_TIMING") +
+                 tick_events(3, "EQUIPOISE_COMMAND"),
+             "a.lcm");
+  std::vector<std::int64_t> ticks;
+  for (TickRecord tick; log.next(&tick);) ticks.push_back(tick.tick);
+  EXPECT_THAT(ticks, testing::ElementsAre(1));
+  EXPECT_EQ(log.incomplete_ticks(), 2);
+}
+
 TEST(RunLog, DamageBetweenEventsIsSkippedAndCounted) {
   const std::string noise(700000, 'x');  // more than one read
   RunLog log(noise + run_event() + tick_events(0) + noise + tick_events(1) + "\xED\xA1\xDA", "a.lcm");

@@ -172,6 +172,14 @@ TEST_F(EqepTest, OldKernelsReportRefusalsAndImpossiblePositionsToo) {
   EXPECT_EQ(eqep_open(&encoder_, "48304180"), -ENOENT);
 }
 
+TEST_F(EqepTest, ThatWasNeverOpenedClosesNothing) {
+  eqep_t zeroed{};
+  ASSERT_EQ(zeroed.fd, 0) << "somebody's descriptor";
+  eqep_close(&zeroed);
+  EXPECT_EQ(SyscallJournal::instance().strayCloses(), 0);
+  EXPECT_EQ(zeroed.fd, -1);
+}
+
 TEST_F(EqepTest, DescriptorZeroIsOneLikeAnyOtherAndIsClosedOnce) {
   const std::string dir = addCounter("48300180", 0);
   {

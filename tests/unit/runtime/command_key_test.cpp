@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "command_fixture.hpp"
+#include "support/failing_rename.hpp"
 #include "support/file_size_limit.hpp"
 
 namespace equipoise::runtime {
@@ -166,6 +167,21 @@ TEST_F(KeyFile, ARotationThatWasInterruptedIsNoHindrance) {
   CommandKeys::rotate(path_);
   EXPECT_EQ(complaint(), "loaded");
   EXPECT_NE(access((path_ + ".new").c_str(), F_OK), 0);
+}
+
+TEST_F(KeyFile, ARotationThatFailsLeavesTheOldKeyAndNoOther) {
+  CommandKeys::create(path_, "mbbr");
+  const CommandKeys old = CommandKeys::load(path_);
+  std::string text;
+  try {
+    const FailingRename broken(EIO);
+    CommandKeys::rotate(path_);
+  } catch (const std::runtime_error& error) {
+    text = error.what();
+  }
+  EXPECT_EQ(text, path_ + ": Input/output error");
+  EXPECT_NE(access((path_ + ".new").c_str(), F_OK), 0) << "a key that nobody knows of";
+  EXPECT_TRUE(convinces(old, CommandKeys::load(path_), "anna"));
 }
 
 TEST_F(KeyFile, ReadingAndWritingLeaveNoDescriptorOpen) {

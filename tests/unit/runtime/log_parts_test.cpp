@@ -55,6 +55,13 @@ TEST_F(LogParts, OtherFilesAreNone) {
   EXPECT_THAT(existing_log_parts((folder_ / "none" / "run.lcm").string()), IsEmpty());
 }
 
+TEST_F(LogParts, ANameThatEndsInDigitsIsNoPartOfItself) {
+  const std::string numbered = file("run.2026");
+  EXPECT_THAT(existing_log_parts(numbered), ElementsAre(numbered));
+  const std::string part = file("run.0001.2026");
+  EXPECT_THAT(existing_log_parts(numbered), ElementsAre(numbered, part));
+}
+
 TEST_F(LogParts, LogsMovedAsideAreListedOldestFirst) {
   const std::string later = file("run.20261122T014503Z.lcm");
   const std::string part = file("run.20261122T014503Z.0001.lcm");

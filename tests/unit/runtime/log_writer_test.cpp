@@ -4,16 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <fstream>
-#include <thread>
+#include <iterator>
 
 #include "equipoise/runtime/log_parts.hpp"
-#include "support/file_size_limit.hpp"
+#include "support/log_event.hpp"
 #include "support/log_folder.hpp"
 
 namespace equipoise::runtime {
@@ -25,10 +24,6 @@ using testing::HasSubstr;
 
 class LogWriterTest : public LogFolder {
  protected:
-  static void write_event(LogWriter* log, std::int64_t utime, std::string_view channel,
-                          const std::vector<std::uint8_t>& data) {
-    std::copy(data.begin(), data.end(), log->event(utime, channel, data.size()));
-  }
   // Two events of 100 bytes.
   static void write_tick(LogWriter* log) {
     write_event(log, 0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
@@ -50,18 +45,6 @@ TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
     log.end_tick();
     EXPECT_EQ(fs::file_size(path_), (tick + 1) * 200);
   }
-}
-
-TEST_F(LogWriterTest, ADiskThatFillsUpInsideATickCostsTheWholeTick) {
-  LogWriter log;
-  ASSERT_TRUE(log.open(path_, {}));
-  {
-    const FileSizeLimit small(550);
-    for (int tick = 0; tick < 5; ++tick) write_tick(&log);
-  }
-  EXPECT_FALSE(log.is_open());
-  EXPECT_THAT(log.error(), HasSubstr("log stopped: File too large"));
-  EXPECT_EQ(fs::file_size(path_), 400U);
 }
 
 TEST_F(LogWriterTest, ALogOfTheSameNameIsReplacedWithAllItsPartsOrKept) {
@@ -100,19 +83,6 @@ TEST_F(LogWriterTest, ALogWhoseFurtherPartSomebodyWritesIsNotTaken) {
   close(writer);
   LogWriter free;
   EXPECT_TRUE(free.open(path_, {}));
-}
-
-TEST_F(LogWriterTest, KeptLogsGoBeforeTheRunsOwnFilesWhenSpaceIsShort) {
-  write("run.20200101T000000Z.lcm", "oldest");
-  write("run.20210101T000000Z.lcm", "old");
-  LogWriter log;
-  LogLimits limits;
-  limits.min_free_bytes = std::int64_t{1} << 60;  // no disk has as much
-  ASSERT_TRUE(log.open(path_, limits));
-  write_tick(&log);
-  EXPECT_TRUE(kept_logs(path_).empty());
-  EXPECT_THAT(log.error(), HasSubstr("No space left"));
-  EXPECT_EQ(fs::file_size(path_), 200U);
 }
 
 TEST_F(LogWriterTest, AnEventIsWhatLcmsLogsHold) {
@@ -155,16 +125,49 @@ TEST_F(LogWriterTest, ADeviceMayTakeTheLog) {
   EXPECT_THAT(full.error(), HasSubstr("log stopped: No space left on device"));
 }
 
-TEST_F(LogWriterTest, AFileThatCannotBeSyncedIsReported) {
-  LogLimits limits;
-  limits.sync = true;
+TEST_F(LogWriterTest, EverybodyMayReadALogAndItsOwnerWritesIt) {
+  const mode_t before = umask(0);
   LogWriter log;
-  ASSERT_TRUE(log.open("/dev/null", limits)) << log.error();
-  for (int i = 0; i < 10000 && log.error().empty(); ++i) {
-    write_tick(&log);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_TRUE(log.open(path_, {}));
+  umask(before);
+  struct stat about {};
+  ASSERT_EQ(stat(path_.c_str(), &about), 0);
+  EXPECT_EQ(about.st_mode & 07777U, 0644U);
+}
+
+TEST_F(LogWriterTest, AnEventMayBeLargerThanAllBeforeIt) {
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {}));
+  constexpr std::size_t kHead = 28 + 1;  // with the channel
+  std::size_t at = 0;
+  for (const std::size_t size : {1U, 100U, 5000U, 300000U, 7U}) {
+    write_event(&log, 0, "C", std::vector<std::uint8_t>(size, 'x'));
+    log.event(0, "D", {});
+    log.end_tick();
+    std::ifstream file(path_, std::ios::binary);
+    const std::string whole((std::istreambuf_iterator<char>(file)), {});
+    ASSERT_EQ(whole.size(), at + 2 * kHead + size);
+    EXPECT_TRUE(whole.substr(at + kHead - 1, 1 + size) == "C" + std::string(size, 'x')) << size;
+    EXPECT_EQ(whole.back(), 'D');
+    at = whole.size();
   }
-  EXPECT_THAT(log.error(), HasSubstr("log stopped: Invalid argument"));
+}
+
+TEST_F(LogWriterTest, AKeptLogIsNamedAfterTheEndOfItsLastPart) {
+  constexpr timespec kEnds[] = {{1795311000, 0}, {1795311903, 0}};  // the second: 2026-11-22 01:45:03 UTC
+  int part = 0;
+  for (const char* name : {"run.lcm", "run.0001.lcm"}) {
+    write(name, "old");
+    const timespec times[] = {kEnds[part], kEnds[part]};
+    ASSERT_EQ(utimensat(AT_FDCWD, (folder_ / name).c_str(), times, 0), 0);
+    ++part;
+  }
+  LogWriter log;
+  LogLimits limits;
+  limits.keep_previous = true;
+  ASSERT_TRUE(log.open(path_, limits));
+  EXPECT_THAT(kept_logs(path_), ElementsAre((folder_ / "run.20261122T014503Z.lcm").string(),
+                                            (folder_ / "run.20261122T014503Z.0001.lcm").string()));
 }
 
 TEST_F(LogWriterTest, AnotherProcessFindsTheLogLockedUntilItIsClosed) {

@@ -136,18 +136,25 @@ def main() -> int:
         nargs="+",
         default=[],
         metavar="SEED",
-        help="samples for which tests were written: they are judged, too, and counted apart; that of --seed "
-        "has none of their mutants",
+        help="samples for which tests were written: that of --seed has none of their mutants. They are "
+        "judged, too, and counted apart",
     )
     parser.add_argument(
         "--learnt-sample", type=int, default=SAMPLE, help="mutants per room of each of them (default 40)"
+    )
+    parser.add_argument(
+        "--fresh-only", action="store_true", help="leave the samples of --learnt out, but do not judge them"
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time (default: the cores)")
     parser.add_argument("--list", action="store_true", help="print the sample and change nothing")
     parser.add_argument(
         "--kept", action="store_true", help="judge nothing: a page of what was measured before of this code"
     )
-    parser.add_argument("--page", action="store_true", help="write the page also when rooms are named")
+    parser.add_argument(
+        "--page",
+        action="store_true",
+        help="write the page also when rooms are named; the others keep their rows",
+    )
     options = parser.parse_args()
     unknown = [name for name in options.rooms if name not in ROOMS]
     if unknown:
@@ -185,19 +192,24 @@ def main() -> int:
             return kept(store, sample, tests_of(ROOMS[name], root))
 
         measured = {name: outcomes(name, sample) for name, sample in samples.items()}
-        before = {key: outcomes(key[0], sample) for key, sample in learnt.items()}
+        before = {key: [] if options.fresh_only else outcomes(key[0], each) for key, each in learnt.items()}
     else:
         with tempfile.TemporaryDirectory(dir=place, prefix="work-") as work:
             campaign = Campaign(root, store, options.jobs, Path(work))
             measured = {name: campaign.go(name, ROOMS[name], sample) for name, sample in samples.items()}
-            before = {key: campaign.go(key[0], ROOMS[key[0]], sample) for key, sample in learnt.items()}
+            before = {
+                key: [] if options.fresh_only else campaign.go(key[0], ROOMS[key[0]], each)
+                for key, each in learnt.items()
+            }
     why = reasons(root)
-    sample = None if options.kept else options.sample
-    text, unexplained = write_page(measured, why, sample, options.seed, root, before)
-    if options.rooms and not options.page:
-        print(text)
+    page = root / "docs" / "mutation.md"
+    to_page = options.page or not options.rooms
+    earlier = page.read_text() if to_page and options.rooms else ""
+    text, unexplained = write_page(measured, why, options.seed, root, before, earlier)
+    if to_page:
+        page.write_text(text)
     else:
-        (root / "docs" / "mutation.md").write_text(text)
+        print(text)
     for line in unexplained:
         print(f"no reason for: {line}", file=sys.stderr)
     return 1 if unexplained else 0

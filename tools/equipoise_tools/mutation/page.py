@@ -16,17 +16,25 @@ Outcomes = list[tuple[Path, str, Mutant, Outcome]]
 Measured = dict[str, Outcomes]
 KILLED = ("killed", "timeout")
 FEWEST = 20  # mutants that say something about a room
+OLDER = "not tried since the tests changed"
 HEAD = """# Mutation testing
 Written by `tools/mutation`. A mutant is the firmware with one token changed: a relation (`<` → `<=`), an
 operator (`+` → `-`, `&&` → `||`), a number (n → n + 1, x → 2 x), a condition negated, a statement
 removed. It is killed when a test of its room fails or exceeds ten times its usual time. Changes that do not
 compile, or to the same object code, are not counted.
 
-{what} Seed {seed}; intervals are Wilson's, 95 %.
+Mutants are drawn at random; intervals are Wilson's, 95 %. Sample "5 without 1, 2" is that of seed 5 without
+the mutants of the samples of seeds 1 and 2: those showed what the tests lacked, and tests were written for
+them; "before" is what became of these. A room keeps its rows until it is measured anew; survivors that have
+not been tried since the tests changed may be killed by now.
+
+| room | mutants in all | sample | drawn | killed | survived | explained | rate | wanted | holds | before |
+|---|---|---|---|---|---|---|---|---|---|---|
 """
-TABLE = """
-| room | mutants in all | drawn | killed | survived | explained | kill rate | wanted | holds |{more}
-|---|---|---|---|---|---|---|---|---|{rule}
+SURVIVORS = """
+## Survivors
+| where | change | why no test notices |
+|---|---|---|
 """
 
 
@@ -54,76 +62,71 @@ def counted(outcomes: Outcomes) -> tuple[int, int]:
     return killed + counts["survived"], killed
 
 
+def rows_of(page: str, name: str, root: Path) -> tuple[str, str]:
+    """A room's row of an earlier page, and those of its survivors."""
+    files = {str(path.relative_to(root)) for path in ROOMS[name].paths(root)}
+    table, _, survivors = page.partition(SURVIVORS)
+    row = [line for line in table.splitlines(True) if line.startswith(f"| {name} |")]
+    theirs = [line for line in survivors.splitlines(True) if line[2:].partition(":")[0] in files]
+    return "".join(row), "".join(theirs)
+
+
+def room_row(name: str, root: Path, sample: str, outcomes: Outcomes, explained: int, before: Outcomes) -> str:
+    tried, killed = counted(outcomes)
+    target = f"{100 * ROOMS[name].target:.0f} %"
+    whole = sum(len(mutants(path.read_text())) for path in ROOMS[name].paths(root))
+    cells: tuple[object, ...] = (name, whole, "", 0, "", "", "", "not measured", target, "not measured")
+    if tried:
+        low, high = wilson(killed, tried)
+        rate = f"{100 * killed / tried:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+        holds = "yes" if killed / tried >= ROOMS[name].target else "**no**"
+        holds = holds if tried >= FEWEST else "too few"
+        cells = (name, whole, sample, tried, killed, tried - killed, explained, rate, target, holds)
+    known, noticed = counted(before)
+    return f"| {' | '.join(map(str, cells))} | {f'{noticed} of {known}' if known else ''} |\n"
+
+
 def write_page(
     measured: Measured,
     why: dict[tuple[str, str, str], str],
-    sample: int | None,
     seed: int,
     root: Path,
     learnt: dict[tuple[str, int], Outcomes] | None = None,
+    earlier: str = "",
 ) -> tuple[str, list[str]]:
-    """The page, and survivors without a reason. `sample`: None of kept outcomes, 0 of all mutants. `learnt`:
-    outcomes of other samples by room and seed, for which tests were written."""
+    """The page, and survivors without a reason. `learnt`: outcomes of other samples by room and seed, for
+    which tests were written. `earlier`: the page whose rows the rooms keep that were not measured."""
     learnt = learnt or {}
-    what = f"At most {sample} mutants per room, drawn at random." if sample else "All mutants."
-    if sample is None:
-        what = (
-            "Drawn at random; of what was measured before (`--kept`), each room as far as it got.\n"
-            "Survivors of older tests have not been tried on today's: kill rates are lower bounds."
-        )
-    page = HEAD.format(what=what, seed=seed)
-    *others, last = sorted({seed for _, seed in learnt}) or [0]
-    seeds = f"{', '.join(map(str, others))} and {last}" if others else str(last)
-    if learnt:
-        page += (
-            f"The samples of seed {seeds} showed what the tests lacked, and tests were written for them; "
-            "none of their\nmutants is in this one, whose rate is the one that holds or not.\n"
-        )
-    beside = any(learnt.values())
-    if learnt and not beside:
-        page += "What became of theirs has not been measured again on today's tests.\n"
-    page += TABLE.format(more=f" seed {seeds} |" if beside else "", rule="---|" if beside else "")
-    survivors, unexplained = "", []
-    for name, outcomes in measured.items():
-        tried, killed = counted(outcomes)
+    page, survivors, unexplained = HEAD, "", []
+    seeds = sorted({one for _, one in learnt})
+    sample = f"{seed} without {', '.join(map(str, seeds))}" if seeds else str(seed)
+    for name in [*ROOMS] if earlier else measured:
+        if name not in measured:
+            row, theirs = rows_of(earlier, name, root)
+            page += row
+            survivors += theirs
+            continue
+        outcomes = measured[name]
         seen = {
             (file, mutant): (file, text, mutant, outcome)
             for (room, _), some in learnt.items()
             if room == name
             for file, text, mutant, outcome in some
         }
-        more = ""
-        if beside:
-            before, noticed = counted(list(seen.values()))
-            more = f" {noticed} of {before} |" if before else " not measured |"
         explained = sum(
             outcome.status == "survived" and (str(file), line_of(text, mutant), mutant.change) in why
             for file, text, mutant, outcome in outcomes
         )
-        target = ROOMS[name].target
-        whole = sum(len(mutants(path.read_text())) for path in ROOMS[name].paths(root))
-        if tried:
-            share = killed / tried
-            low, high = wilson(killed, tried)
-            rate = f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
-            holds = "yes" if share >= target else "**no**"
-            holds = holds if tried >= FEWEST else "too few"
-            lived = (tried - killed, explained)
-            row = (name, whole, tried, killed, *lived, rate, f"{100 * target:.0f} %", holds)
-        else:
-            row = (name, whole, 0, "", "", "", "not measured", f"{100 * target:.0f} %", "not measured")
-        page += f"| {' | '.join(map(str, row))} |{more}\n"
+        page += room_row(name, root, sample, outcomes, explained, list(seen.values()))
         for file, text, mutant, outcome in [*seen.values(), *outcomes]:
             if outcome.status != "survived":
                 continue
             code = line_of(text, mutant)
             reason = why.get((str(file), code, mutant.change), "")
             if not reason and outcome.by == OLDER_TESTS:
-                reason = "not tried since the tests changed"
+                reason = OLDER
             if not reason:
                 unexplained.append(f"{file}:{mutant.line} {mutant.change}   [{code}]")
             cells = (f"{file}:{mutant.line}", f"`{mutant.change}`", reason or "**none yet**")
             survivors += f"| {' | '.join(map(cell, cells))} |\n"
-    if survivors:
-        page += f"\n## Survivors\n| where | change | why no test notices |\n|---|---|---|\n{survivors}"
-    return page, unexplained
+    return page + (SURVIVORS + survivors if survivors else ""), unexplained

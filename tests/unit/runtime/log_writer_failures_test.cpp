@@ -1,0 +1,184 @@
+// What a log does where disk, pipe and folder fail it: it says so, and what was whole stays whole.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "equipoise/runtime/log_parts.hpp"
+#include "runtime/log_writer.hpp"
+#include "support/file_size_limit.hpp"
+#include "support/log_event.hpp"
+#include "support/log_folder.hpp"
+
+namespace equipoise::runtime {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class LogWriterFailures : public LogFolder {
+ protected:
+  // Two events of 100 bytes.
+  static void write_tick(LogWriter* log) {
+    write_event(log, 0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
+    write_event(log, 0, "CHANNEL2", std::vector<std::uint8_t>(100 - 28 - 8));
+    log->end_tick();
+  }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+  }
+};
+
+TEST_F(LogWriterFailures, ADiskThatFillsUpInsideATickCostsTheWholeTick) {
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {}));
+  {
+    const FileSizeLimit small(550);
+    for (int tick = 0; tick < 5; ++tick) write_tick(&log);
+  }
+  EXPECT_FALSE(log.is_open());
+  EXPECT_THAT(log.error(), HasSubstr("log stopped: File too large"));
+  EXPECT_EQ(fs::file_size(path_), 400U);
+}
+
+TEST_F(LogWriterFailures, AFileThatCannotBeSyncedIsReported) {
+  LogLimits limits;
+  limits.sync = true;
+  LogWriter log;
+  ASSERT_TRUE(log.open("/dev/null", limits)) << log.error();
+  for (int i = 0; i < 10000 && log.error().empty(); ++i) {
+    write_tick(&log);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_THAT(log.error(), HasSubstr("log stopped: Invalid argument"));
+}
+
+TEST_F(LogWriterFailures, WhatCannotBeSyncedAtTheEndIsReportedWhereSyncingWasAskedFor) {
+  LogLimits limits;
+  limits.sync = true;
+  LogWriter log;
+  ASSERT_TRUE(log.open("/dev/null", limits));
+  log.close();
+  EXPECT_THAT(log.error(), HasSubstr("log stopped: Invalid argument"));
+  LogWriter unsynced;
+  ASSERT_TRUE(unsynced.open("/dev/null", {}));
+  unsynced.close();
+  EXPECT_EQ(unsynced.error(), "");
+}
+
+TEST_F(LogWriterFailures, AnEventThatCannotBeCutBackIsSaidToBeTorn) {
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  const int reader = open(path_.c_str(), O_RDONLY | O_NONBLOCK);
+  const auto before = std::signal(SIGPIPE, SIG_IGN);
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {})) << log.error();
+  std::thread leaves([reader] {
+    for (int bytes = 0; ioctl(reader, FIONREAD, &bytes) == 0 && bytes == 0;)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    close(reader);
+  });
+  write_event(&log, 0, "CHANNEL1", std::vector<std::uint8_t>(4 << 20));  // more than a pipe holds
+  log.end_tick();
+  leaves.join();
+  std::signal(SIGPIPE, before);
+  EXPECT_THAT(log.error(), HasSubstr("log stopped: Broken pipe; its last event is torn"));
+}
+
+TEST_F(LogWriterFailures, AWriteThatASignalInterruptsGoesOn) {
+  static std::atomic<int> signals{0};
+  struct sigaction counts {};
+  counts.sa_handler = [](int) { ++signals; };  // no SA_RESTART
+  struct sigaction before {};
+  ASSERT_EQ(sigaction(SIGUSR1, &counts, &before), 0);
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  const int reader = open(path_.c_str(), O_RDONLY | O_NONBLOCK);
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {})) << log.error();
+  constexpr std::size_t kSize = 1 << 20;  // more than a pipe holds: the writer waits
+  std::size_t received = 0;
+  std::thread reads([reader, &received, writer = pthread_self()] {
+    for (int bytes = 0; ioctl(reader, FIONREAD, &bytes) == 0 && bytes == 0;)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (signals < 20) {
+      pthread_kill(writer, SIGUSR1);
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    fcntl(reader, F_SETFL, 0);
+    std::vector<char> some(65536);
+    for (ssize_t n = 0; (n = read(reader, some.data(), some.size())) > 0;)
+      received += static_cast<std::size_t>(n);
+  });
+  write_event(&log, 0, "C", std::vector<std::uint8_t>(kSize));
+  log.end_tick();
+  EXPECT_EQ(log.error(), "");
+  log.close();
+  reads.join();
+  close(reader);
+  sigaction(SIGUSR1, &before, nullptr);
+  EXPECT_EQ(received, 28 + 1 + kSize);
+}
+
+TEST_F(LogWriterFailures, AnEarlierPartThatCannotBeOpenedOrRemovedIsNamedAsTheReason) {
+  write("run.lcm", "first");
+  fs::create_symlink("nowhere", folder_ / "run.0001.lcm");
+  LogWriter log;
+  EXPECT_FALSE(log.open(path_, {}));
+  EXPECT_THAT(log.error(), HasSubstr("run.lcm: log cannot be created: No such file or directory"));
+  EXPECT_EQ(fs::file_size(path_), 5U) << "and nothing is gone";
+
+  fs::remove(folder_ / "run.0001.lcm");
+  fs::create_directory(folder_ / "run.0001.lcm");
+  LogWriter second;
+  EXPECT_FALSE(second.open(path_, {}));
+  EXPECT_THAT(second.error(), HasSubstr("run.lcm: log cannot be created: Is a directory"));
+}
+
+TEST_F(LogWriterFailures, KeptLogsGoBeforeTheRunsOwnFilesWhenSpaceIsShort) {
+  write("run.20200101T000000Z.lcm", "oldest");
+  write("run.20210101T000000Z.lcm", "old");
+  LogWriter log;
+  LogLimits limits;
+  limits.min_free_bytes = std::int64_t{1} << 60;  // no disk has as much
+  ASSERT_TRUE(log.open(path_, limits));
+  write_tick(&log);
+  EXPECT_TRUE(kept_logs(path_).empty());
+  EXPECT_THAT(log.error(), HasSubstr("No space left"));
+  EXPECT_EQ(fs::file_size(path_), 200U);
+}
+
+TEST_F(LogWriterFailures, WhereSpaceIsShortItsOwnFilesGoButTheLast) {
+  LogWriter log;
+  LogLimits limits;
+  limits.min_free_bytes = std::int64_t{1} << 60;  // no disk has as much
+  limits.max_bytes = 200;
+  ASSERT_TRUE(log.open(path_, limits));
+  write_tick(&log);
+  EXPECT_THAT(existing_log_parts(path_), ElementsAre(log_part(path_, 1)));
+  EXPECT_THAT(log.error(), HasSubstr("No space left"));
+}
+
+TEST_F(LogWriterFailures, WhereSpaceIsEnoughNothingGoes) {
+  write("run.20200101T000000Z.lcm", "oldest");
+  LogWriter log;
+  LogLimits limits;
+  limits.min_free_bytes = 1;
+  limits.max_bytes = 200;
+  ASSERT_TRUE(log.open(path_, limits));
+  for (int tick = 0; tick < 3; ++tick) write_tick(&log);
+  EXPECT_EQ(existing_log_parts(path_).size(), 4U);
+  EXPECT_EQ(kept_logs(path_).size(), 1U);
+  EXPECT_EQ(log.error(), "");
+}
+
+}  // namespace
+}  // namespace equipoise::runtime
