@@ -40,7 +40,7 @@ build_can_modules() {
 
 # run_can_machine SECONDS PROGRAM: the console on stdout.
 run_can_machine() {
-  timeout "$1" qemu-system-x86_64 -M q35 -cpu max -smp 2 -m 512 -nographic -no-reboot -net none \
+  timeout --foreground "$1" qemu-system-x86_64 -M q35 -cpu max -smp 2 -m 512 -nographic -no-reboot -net none \
     -object can-bus,id=bus -device kvaser_pci,canbus=bus -device kvaser_pci,canbus=bus \
     -kernel "$can_tree/boot/vmlinuz-$can_kernel_version" -initrd "$vm/can-initramfs.gz" \
     -append "console=ttyS0 quiet panic=-1 run=$2" \

@@ -24,7 +24,7 @@ prepare_card() {
 
 # run_card SECONDS: the console on stdout.
 run_card() {
-  timeout "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none -icount shift=0,sleep=off \
+  timeout --foreground "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none -icount shift=0,sleep=off \
     -kernel "$vm/card-vmlinuz" -initrd "$vm/card-initrd.img" \
     -append "root=LABEL=equipoise rootwait ro console=ttyAMA0 quiet panic=-1" \
     -drive "if=none,id=card,format=raw,file=$card" -device virtio-blk-pci,drive=card \

@@ -57,7 +57,7 @@ build_modules() {
 # console is on stdout, and at its end how it ended.
 run_hang() {
   local seconds=$1 asked=$2 status=0
-  timeout "$seconds" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 256 -nographic -no-reboot -net none \
+  timeout --foreground "$seconds" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 256 -nographic -no-reboot -net none \
     -icount shift=0,sleep=off -device i6300esb -action watchdog=reset \
     -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/hang-initramfs.gz" \
     -append "console=ttyAMA0 quiet panic=-1 watchdog=$asked" </dev/null >"$vm/console-hang.raw" || status=$?
@@ -81,7 +81,7 @@ judge_hang() {
 # run_machine SECONDS ARGUMENTS: boots; the arguments go to tests/hardware/init. The console is on stdout.
 # Its clock counts instructions, one per ns: deadlines hold however slow or busy this machine is, and idling is free.
 run_machine() {
-  timeout "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none \
+  timeout --foreground "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none \
     -icount shift=0,sleep=off \
     -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/initramfs.gz" \
     -append "console=ttyAMA0 quiet panic=-1 $2" \

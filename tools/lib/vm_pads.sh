@@ -37,7 +37,7 @@ prepare_pads() {
 
 # run_pads SECONDS MACHINE BUILD SYSROOT: the console on stdout.
 run_pads() {
-  timeout "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 192 -nographic -no-reboot -net none \
+  timeout --foreground "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 192 -nographic -no-reboot -net none \
     -icount shift=0,sleep=off -dtb "$pads/$2.dtb" \
     -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/pads-initramfs.gz" \
     -append "console=ttyAMA0 quiet panic=-1 machine=$2 build=/mnt/$3 sysroot=/mnt/$4" \
