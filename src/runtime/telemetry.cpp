@@ -14,7 +14,10 @@ namespace equipoise::runtime {
 namespace {
 
 constexpr std::size_t kQueueTicks = 1024;  // five seconds at 200 Hz
-constexpr auto kIdle = std::chrono::milliseconds(2);
+// Between looks at an empty queue: two ticks on a robot, where to wake up costs more than to write one, and
+// a log that SIGKILL may cut by 100 ms has time; less for a simulation, which waits when the queue is full.
+constexpr auto kIdle = std::chrono::milliseconds(10);
+constexpr auto kIdleOfSimulation = std::chrono::milliseconds(2);
 
 std::string upper(std::string text) {
   for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
@@ -175,7 +178,7 @@ void Telemetry::run() {
       any = true;
     }
     if (stopping) break;
-    if (!any) std::this_thread::sleep_for(kIdle);
+    if (!any) std::this_thread::sleep_for(options_.wait_when_full ? kIdleOfSimulation : kIdle);
   }
   if (end_) writer_->end(*end_);
   writer_->close_log();

@@ -84,3 +84,18 @@ def test_the_mbbrs_log_costs_a_quarter_of_a_tick(committed):
 def test_the_bridges_inversion_costs_two_fifths_of_newtons(machine_counts):
     bridge = machine_counts["bridge"]
     assert bridge["inversion"] <= 0.4 * bridge["newton"]
+
+
+def test_the_whole_firmwares_load_is_its_instructions_and_the_arithmetics_further_cycles():
+    console = """VM: running
+equipoise: warning
+{"instructions":{"guard":1000.4,"kernel":2000.0,"loop":3000.0,"threads":4000.0},"load":"mbbr"}
+"""
+    assert count.firmware_load(console) is None, "one robot is missing"
+    console += console.replace("mbbr", "mip").replace("4000.0", "14000.0")
+    firmware = count.firmware_load(console)
+    assert firmware["mbbr"] == {"guard": 1000, "kernel": 2000, "loop": 3000, "threads": 4000}
+    robots = {r: {"tick": 1500, "tick_cycles": 41500} for r in count.ROBOTS}
+    load = count.whole_load(firmware, robots)
+    assert load["mbbr"] == pytest.approx({1: 0.01, 2: 0.012})  # 50,000 and 60,000 cycles of 5,000,000
+    assert load["mip"] == pytest.approx({1: 0.012, 2: 0.016})

@@ -27,6 +27,8 @@ TICK_HZ = 200
 CLOCK_HZ = 1e9
 TABLE = Path("tests/data/instructions.json")
 PAGE = Path("docs/performance.md")
+LOAD_LOG = Path("build/vm/console-load.log")  # what tools/vm-test load leaves
+MOST_LOAD = 0.08  # of 1 GHz, of the whole firmware
 # Where a line of the tick belongs: by its file, or, of a call in the tick itself, by the function.
 STAGES = {
     "sense": r"/sense/|Senses|attitude_filter",
@@ -206,6 +208,16 @@ def counted(machine) -> dict:
     return result
 
 
+def firmware_load(console: str) -> dict[str, dict[str, int]] | None:
+    """Instructions per tick of the whole firmware in the emulated robot, by who took them."""
+    found = {}
+    for line in console.splitlines():
+        if line.startswith('{"instructions"'):
+            robot = json.loads(line)
+            found[robot["load"]] = {k: round(v) for k, v in robot["instructions"].items()}
+    return found if set(found) == set(ROBOTS) else None
+
+
 def count_all(root: Path) -> dict:
     result: dict = {"x86": counted(Callgrind(root))}
     with tempfile.TemporaryDirectory() as folder:
@@ -214,6 +226,8 @@ def count_all(root: Path) -> dict:
         except UserError as missing:
             result["cortex_a8"] = None
             result["cortex_a8_missing"] = str(missing)
+    log = root / LOAD_LOG
+    result["firmware"] = firmware_load(log.read_text(encoding="utf-8")) if log.is_file() else None
     return result
 
 
@@ -266,6 +280,55 @@ def a8_load(robots: dict) -> list[str]:
     ]
 
 
+def whole_load(firmware: dict, robots: dict) -> dict[str, dict[int, float]]:
+    """Of 1 GHz, by the cycles that an instruction is taken to need that is none of the tick's arithmetic."""
+    load: dict[str, dict[int, float]] = {}
+    for robot in ROBOTS:
+        arithmetic = robots[robot]["tick_cycles"] - robots[robot]["tick"]
+        instructions = sum(firmware[robot].values())
+        load[robot] = {n: (n * instructions + arithmetic) * TICK_HZ / CLOCK_HZ for n in (1, 2)}
+    return load
+
+
+def firmware_table(firmware: dict, robots: dict | None) -> list[str]:
+    lines = [
+        "",
+        "## The whole firmware",
+        "| instructions per tick, emulated robot | mbbr | mip |",
+        "|---|---|---|",
+    ]
+    rows = [
+        ("loop: drivers, tick, hand-over", "loop"),
+        ("log and telemetry", "threads"),
+        ("guard", "guard"),
+        ("kernel beside them: interrupts, timers, its own threads", "kernel"),
+    ]
+    for label, key in rows:
+        lines.append(f"| {label} | " + " | ".join(f"{firmware[r][key]:,}" for r in ROBOTS) + " |")
+    lines.append("| sum | " + " | ".join(f"{sum(firmware[r].values()):,}" for r in ROBOTS) + " |")
+    if robots is not None:
+        load = whole_load(firmware, robots)
+        for n in (1, 2):
+            cells = " | ".join(f"{load[r][n]:.1%}" for r in ROBOTS)
+            lines.append(
+                f"| load of 1 GHz, {n} cycle{'s' if n > 1 else ''} each and the tick's VFP | {cells} |"
+            )
+    return [
+        *lines,
+        "",
+        "Counted by `./tools/vm-test load`: `equipoise run` with guard, log and telemetry balances a "
+        "simulated robot through a PREEMPT_RT kernel for 20 s; the machine's clock counts instructions, so "
+        "that the kernel's account of who ran how long is their number. System calls are in the row of who "
+        "made them. Not in it: what the simulated robot takes, and what the kernel takes for it while no "
+        "firmware runs. To the sum are added the cycles beyond one per instruction that the tick's "
+        f"arithmetic takes, from above. Aimed at: {MOST_LOAD:.0%}. Assumed: one cycle for every other "
+        "instruction; the last row assumes two, and a board decides between them, as waiting for memory is "
+        "not counted. The emulated machine's I2C, GPIO, PWM and counters are simple drivers "
+        "(tests/hardware/kernel, gpio-sim); those of the AM335x take more, I2C an interrupt every few bytes. "
+        "The log goes to memory, not to an SD card.",
+    ]
+
+
 def write_page(root: Path, counts: dict) -> None:
     from .style import plt  # only this needs Matplotlib
 
@@ -298,6 +361,10 @@ def write_page(root: Path, counts: dict) -> None:
         text += a8_load(counts["cortex_a8"])
     else:
         text += ["", f"Cortex-A8: not counted ({counts['cortex_a8_missing']})."]
+    if counts["firmware"] is not None:
+        text += firmware_table(counts["firmware"], counts["cortex_a8"])
+    else:
+        text += ["", "The whole firmware: not counted; run `./tools/vm-test load` before."]
     (root / PAGE).write_text("\n".join(text) + "\n", encoding="utf-8")
     (root / TABLE).write_text(json.dumps(counts, indent=1) + "\n", encoding="utf-8")
 
@@ -321,6 +388,8 @@ def main() -> int:
         Path(options.json).write_text(json.dumps(counts) + "\n", encoding="utf-8")
     else:
         print("\n".join(table(counts)))
+        if counts["firmware"] is not None:
+            print("\n".join(firmware_table(counts["firmware"], counts["cortex_a8"])))
         if counts["cortex_a8"] is None:
             print(f"Cortex-A8: not counted ({counts['cortex_a8_missing']})")
     return 0
