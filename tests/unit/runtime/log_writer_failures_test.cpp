@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -40,15 +41,17 @@ class LogWriterFailures : public LogFolder {
 };
 
 TEST_F(LogWriterFailures, ADiskThatFillsUpInsideATickCostsTheWholeTick) {
-  LogWriter log;
-  ASSERT_TRUE(log.open(path_, {}));
-  {
-    const FileSizeLimit small(550);
-    for (int tick = 0; tick < 5; ++tick) write_tick(&log);
+  for (const rlim_t room : {550U, 401U, 599U}) {
+    LogWriter log;
+    ASSERT_TRUE(log.open(path_, {}));
+    {
+      const FileSizeLimit small(room);
+      for (int tick = 0; tick < 5; ++tick) write_tick(&log);
+    }
+    EXPECT_FALSE(log.is_open());
+    EXPECT_THAT(log.error(), HasSubstr("log stopped: File too large"));
+    EXPECT_EQ(fs::file_size(path_), 400U);
   }
-  EXPECT_FALSE(log.is_open());
-  EXPECT_THAT(log.error(), HasSubstr("log stopped: File too large"));
-  EXPECT_EQ(fs::file_size(path_), 400U);
 }
 
 TEST_F(LogWriterFailures, AFileThatCannotBeSyncedIsReported) {
@@ -104,8 +107,9 @@ TEST_F(LogWriterFailures, AWriteThatASignalInterruptsGoesOn) {
   const int reader = open(path_.c_str(), O_RDONLY | O_NONBLOCK);
   LogWriter log;
   ASSERT_TRUE(log.open(path_, {})) << log.error();
-  constexpr std::size_t kSize = 1 << 20;  // more than a pipe holds: the writer waits
-  std::size_t received = 0;
+  std::vector<std::uint8_t> data(1 << 20);  // more than a pipe holds: the writer waits
+  for (std::size_t i = 0; i < data.size(); ++i) data[i] = static_cast<std::uint8_t>(i % 251);
+  std::string received;
   std::thread reads([reader, &received, writer = pthread_self()] {
     for (int bytes = 0; ioctl(reader, FIONREAD, &bytes) == 0 && bytes == 0;)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -116,16 +120,18 @@ TEST_F(LogWriterFailures, AWriteThatASignalInterruptsGoesOn) {
     fcntl(reader, F_SETFL, 0);
     std::vector<char> some(65536);
     for (ssize_t n = 0; (n = read(reader, some.data(), some.size())) > 0;)
-      received += static_cast<std::size_t>(n);
+      received.append(some.data(), static_cast<std::size_t>(n));
   });
-  write_event(&log, 0, "C", std::vector<std::uint8_t>(kSize));
+  write_event(&log, 0, "C", data);
   log.end_tick();
   EXPECT_EQ(log.error(), "");
   log.close();
   reads.join();
   close(reader);
   sigaction(SIGUSR1, &before, nullptr);
-  EXPECT_EQ(received, 28 + 1 + kSize);
+  ASSERT_EQ(received.size(), 28 + 1 + data.size());
+  EXPECT_TRUE(std::equal(data.begin(), data.end(), received.begin() + 28 + 1,
+                         [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); }));
 }
 
 TEST_F(LogWriterFailures, AnEarlierPartThatCannotBeOpenedOrRemovedIsNamedAsTheReason) {

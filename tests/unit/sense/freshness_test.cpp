@@ -152,6 +152,16 @@ TEST(FreshnessTest, OneSampleTwiceIsNotNews) {
   EXPECT_FALSE(imu_ok(robot.see(first).raw));
 }
 
+TEST(FreshnessTest, OtherCountsUnderTheSameStampAreNotNews) {
+  Robot robot;
+  const std::int64_t stamp = robot.next().raw.t_ns;
+  robot.pass();
+  RawSample raw = robot.sound();
+  raw.t_ns = stamp;
+  EXPECT_FALSE(imu_ok(robot.see(raw).raw));
+  EXPECT_TRUE(imu_ok(robot.next().raw));
+}
+
 TEST(FreshnessTest, AnAxisWhoseCountStandsStillForSixTicksIsDead) {
   Robot robot;
   const double stuck = robot.next().raw.gyro_counts[2];

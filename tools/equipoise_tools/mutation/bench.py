@@ -163,6 +163,8 @@ class Worker:
             place = self.overlay / file
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text(text)
+            for source in stage.sources:
+                first.append(self.compile(Path(source), None))
             for i, made in enumerate(linked):
                 if str(self.build.root / file) in self.build.includes(made):
                     linked[i] = self.compile(self.source_of(stage, made), None)

@@ -13,6 +13,9 @@ class Stage:
 
     binary: str
     tests: tuple[str, ...]  # sources under tests/ that are linked; the binary's fixtures, too
+    sources: tuple[
+        str, ...
+    ] = ()  # of the libraries, which hold a header's code; compiled anew for its mutants
     filter: str = "*"
     program: bool = False  # the tests start `equipoise`: it is linked anew, too
     only: tuple[str, ...] = ("*",)  # files whose mutants it is for
@@ -63,9 +66,11 @@ COMMANDS = (
 )
 
 ESTIMATORS = (
-    *("dead_encoders", "gyro_watch", "heun", "kalman", "packed_filter"),
+    *("bias_jump", "dead_encoders", "gyro_watch", "heun", "kalman"),
     *("rest_bias", "slow_drift", "time_base", "wheel_isolation"),
 )
+# Where the filters of the robots are instantiated, once for all who use them.
+FILTERS = ("src/robots/mbbr/ekf.cpp", "src/robots/mip/ekf.cpp")
 CONTROL_TESTS = {
     **dict.fromkeys(("allocate", "governor"), "governor"),
     **dict.fromkeys(("friction", "gain_schedule"), "gain_schedule"),
@@ -196,7 +201,20 @@ ROOMS: dict[str, Room] = {
                 ("unit/sense/calibrate_test.cpp",),
                 only=("include/equipoise/estimate/rest_tilt.hpp",),
             ),
-            Stage("tests/unit_tests", ("unit/estimate/*_test.cpp",), never=("*/freshness.hpp",)),
+            Stage(
+                "tests/unit_tests",
+                ("unit/estimate/gyro_parts_test.cpp",),
+                only=tuple(f"*/gyro_{name}.hpp" for name in ("history", "lie", "noise", "watch")),
+            ),
+            Stage(
+                "tests/unit_tests",
+                ("unit/estimate/packed_filter_test.cpp",),
+                sources=FILTERS,
+                only=("*/packed_filter.hpp", "*/downdate.hpp", "*/pair.hpp"),
+            ),
+            Stage(
+                "tests/unit_tests", ("unit/estimate/*_test.cpp",), sources=FILTERS, never=("*/freshness.hpp",)
+            ),
         ),
     ),
     "control": Room(
