@@ -147,7 +147,12 @@ TEST(Pipeline, WheelsAreShakenAfterArmingUnlessTheEstimatorTellsTheirEncodersApa
 }
 
 TEST(Pipeline, TheShakesAnswerIsHeldAgainstTheDutyInTheWheelsSense) {
-  for (const double encoder_sign : {1.0, -1.0}) {
+  struct Case {
+    Vec<2> encoder_sign;
+    std::uint32_t reasons;
+  };
+  for (const Case& c : {Case{{1.0, 1.0}, 0}, Case{{1.0, -1.0}, kEncoderSign | kWheelTwo},
+                        Case{{-1.0, 1.0}, kEncoderSign | kWheelOne}}) {
     auto p = Bench<>::usual();
     p.calibration.motor_sign = {1.0, -1.0, 1.0, 1.0};
     Bench<> b(p, false);
@@ -155,11 +160,11 @@ TEST(Pipeline, TheShakesAnswerIsHeldAgainstTheDutyInTheWheelsSense) {
     auto t = b.step();
     for (int i = 0; i < 50 && t.arm_state == ArmState::kArmed; ++i) {
       rate = 0.75 * (rate + Vec<2>(t.motors.duty[0], -t.motors.duty[1]));
-      b.raw.encoder_counts[0] += 20.0 * rate(0);
-      b.raw.encoder_counts[1] += 20.0 * encoder_sign * rate(1);
+      b.raw.encoder_counts[0] += 20.0 * c.encoder_sign(0) * rate(0);
+      b.raw.encoder_counts[1] += 20.0 * c.encoder_sign(1) * rate(1);
       t = b.step();
     }
-    EXPECT_EQ(t.reasons, encoder_sign > 0.0 ? 0U : std::uint32_t{kEncoderSign | kWheelTwo});
+    EXPECT_EQ(t.reasons, c.reasons);
   }
 }
 

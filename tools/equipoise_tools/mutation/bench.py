@@ -106,7 +106,7 @@ def run(command: list[str], cwd: Path, limit_s: float, **options) -> int:
 class Worker:
     """A folder in which one mutant at a time is built and run."""
 
-    COMPILE_LIMIT_S = 600.0
+    COMPILE_LIMIT_S = 3600.0  # every compilation ends; a machine may have other work
 
     def __init__(self, build: Build, folder: Path):
         self.build, self.folder = build, folder
