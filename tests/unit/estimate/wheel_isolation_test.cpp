@@ -15,6 +15,7 @@ struct World {
   double lie = 8.0;     // what a filter is surprised by that believes the liar
   double noise = 0.01;  // and what any other
   double rate_rad_s = 0.0;
+  mutable int updates = 0;  // of all filters
 };
 
 struct FakeFilter {
@@ -28,6 +29,7 @@ struct FakeFilter {
 
   void predict(double u) { input = u; }
   void update(const Measurement<kWheels>& z) {
+    ++world->updates;
     used = z.wheel_ok;
     const bool misled = world->liar >= 0 && z.wheel_ok[static_cast<std::size_t>(world->liar)];
     nis.fill(misled ? world->lie : world->noise);
@@ -111,6 +113,25 @@ TEST_F(Isolate, WithoutASurpriseSlipIsNoWheels) {
   EXPECT_EQ(ticks_to_find(500, 1.0), 0);
   world_.lie = 1.1;
   EXPECT_NE(ticks_to_find(100, 1.0), 0);
+}
+
+TEST_F(Isolate, TheBankRunsAfterArmingAndUnderSuspicionOnly) {
+  const auto runs_after = [&](int ticks, double slip_rad_s) {
+    for (int i = 1; i < ticks; ++i) tick(slip_rad_s);
+    world_.updates = 0;
+    tick(slip_rad_s);
+    return world_.updates == 1 + kWheels;
+  };
+  EXPECT_TRUE(runs_after(1, 0.0));
+  EXPECT_TRUE(runs_after(99, 0.0));
+  EXPECT_FALSE(runs_after(5, 0.0));
+  EXPECT_FALSE(runs_after(60, 0.14)) << "pushes come so far";
+  EXPECT_TRUE(runs_after(60, 0.16));
+  EXPECT_FALSE(runs_after(150, 0.0)) << "that is over";
+  world_.noise = 0.49;
+  EXPECT_FALSE(runs_after(60, 0.0));
+  world_.noise = 0.51;
+  EXPECT_TRUE(runs_after(60, 0.0));
 }
 
 TEST_F(Isolate, ASurpriseThatNoWheelExplainsBlamesNone) {
