@@ -17,6 +17,9 @@ class BiasJump {
  public:
   static constexpr int kTicks = 4;  // of an examination
   static constexpr int kMean = 3;   // the last of them, whose mean is compared
+  /// What was taken off may have been the end of a lie that the filter had followed: it finds the bias anew.
+  static constexpr double kDoubt_rad_s = 0.1;
+  static constexpr double kFoundAnew_rad_s = 0.4;  // and may find it so far away
 
   bool examining() const noexcept { return ticks_ > 0; }
 

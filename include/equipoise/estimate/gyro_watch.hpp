@@ -123,6 +123,7 @@ class GyroWatch {
   bool left_out() const noexcept { return ticks_out_ >= kReported; }
   /// What its bias has jumped by is taken off what it says.
   bool bias_jumped() const noexcept { return jump_.jumps() > 0; }
+  int bias_jumps() const noexcept { return jump_.jumps(); }
 
  private:
   // Swapped axes look like an encoder that counts wrongly within so few ticks; twice as many tell them apart.

@@ -24,6 +24,8 @@ class SlowDrift {
     explained_ = std::max(explained, (1.0 - kTickS / kTimeConstant_s) * explained_);
     passing_ = std::max(passing, (1.0 - kTickS / kPassing_s) * passing_);
   }
+  /// A cause that has moved it once, and for good.
+  void excuse(double explained) noexcept { explained_ = std::max(explained_, explained); }
   double distance() const noexcept { return std::max(0.0, (value_ - mean_).norm() - explained_ - passing_); }
 
  private:

@@ -85,6 +85,9 @@ class MbbrEkf {
   MbbrEstimate estimate() const noexcept;
   Vec3 wheel_rate_rad_s() const noexcept;
 
+  /// The gyro's bias is known to so much less.
+  void doubt_bias(double sigma_rad_s) noexcept { filter_.widen(Model::kBiasX, 2, sigma_rad_s * sigma_rad_s); }
+
   const Vec<18>& x() const noexcept { return filter_.x(); }
   Mat<18, 18> P() const noexcept { return filter_.P(); }
   /// gyro x, y, z, wheels, accelerometer x, y: squared innovation over its variance; 0 where not used.

@@ -119,7 +119,12 @@ EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
 void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   MbbrEstimate& x = estimates_[index(Id::kEkf)];
   Mbbr::Sample believed = z;
+  const int jumps = gyro_watch_.bias_jumps();
   gyro_watch_.screen(believed, x.omega_B, u);
+  if (gyro_watch_.bias_jumps() != jumps) {
+    ekf_.doubt_bias(BiasJump::kDoubt_rad_s);
+    bias_drift_.excuse(BiasJump::kFoundAnew_rad_s);
+  }
   const double spin_rad_s = Mbbr::vertical_spin_rad_s(x);
   const double scale = believable_scale(ekf_.x()(MbbrEkfModel::kWheelScale));
   isolation_.step(ekf_, u, believed, [&](const Vec3& wheel_rates) {

@@ -92,6 +92,11 @@ class MipEkf {
   MipEstimate estimate() const noexcept;
   Vec2 wheel_rate_rad_s() const noexcept;
 
+  /// The gyro's bias is known to so much less.
+  void doubt_bias(double sigma_rad_s) noexcept {
+    filter_.widen(Model::kGyroBias, 1, sigma_rad_s * sigma_rad_s);
+  }
+
   const Vec<14>& x() const noexcept { return filter_.x(); }
   Mat<14, 14> P() const noexcept { return filter_.P(); }
   /// gyro x, y, z, wheels, accelerometer y: squared innovation over its variance; 0 where not used.

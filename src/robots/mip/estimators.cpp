@@ -135,7 +135,12 @@ void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   MipEstimate& x = estimates_[index(Id::kEkf)];
   Mip::Sample believed = z;
   const Vec3 expected_rad_s = body_rates(x);
+  const int jumps = gyro_watch_.bias_jumps();
   gyro_watch_.screen(believed, expected_rad_s, u);
+  if (gyro_watch_.bias_jumps() != jumps) {
+    ekf_.doubt_bias(BiasJump::kDoubt_rad_s);
+    bias_drift_.excuse(BiasJump::kFoundAnew_rad_s);
+  }
   // Without slip the wheels turn the body as the gyro says, with the radii that the filter has learnt: 1.5 %
   // of 1 Hz would fill the memory of what has slipped as far as play does.
   const double scale = believable_scale(ekf_.x()(MipEkfModel::kWheelScale));

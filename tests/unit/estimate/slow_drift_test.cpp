@@ -38,6 +38,19 @@ TEST(SlowDrift, AKnownCauseExplainsItsShareForAsLongAsTheMeanRemembers) {
   EXPECT_NEAR(drift.distance(), 0.05, 1e-4);
 }
 
+TEST(SlowDrift, WhatIsExcusedOnceIsSoForAsLongAsTheMeanRemembers) {
+  SlowDrift<1> drift;
+  drift.reset(Vec<1>(0.0));
+  drift.excuse(0.2);
+  drift.update(Vec<1>(0.15), 0.0, 0.0);
+  EXPECT_EQ(drift.distance(), 0.0);
+  for (int i = 0; i < 4000; ++i) drift.update(Vec<1>(0.15), 0.0, 0.0);
+  EXPECT_EQ(drift.distance(), 0.0);
+  for (int i = 0; i < 12000; ++i) drift.update(Vec<1>(0.15), 0.0, 0.0);
+  drift.update(Vec<1>(0.0), 0.0, 0.0);
+  EXPECT_GT(drift.distance(), 0.1);
+}
+
 TEST(SlowDrift, APassingCauseExplainsForAMoment) {
   SlowDrift<1> drift;
   drift.reset(Vec<1>(0.0));
