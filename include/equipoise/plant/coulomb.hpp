@@ -25,12 +25,12 @@ struct Stiction {
 };
 
 /// Axes that do not influence each other, each with its own limit; `mobility`: 1/effective inertia of each.
-template <int N>
-Vec<N> uncoupled_coulomb_torque(const Vec<N>& free_rate, const Vec<N>& mobility, double step_s,
-                                const Vec<N>& mu_c) noexcept {
-  Vec<N> tau;
+template <class Real, int N>
+VecOf<Real, N> uncoupled_coulomb_torque(const VecOf<Real, N>& free_rate, const VecOf<Real, N>& mobility,
+                                        double step_s, const VecOf<Real, N>& mu_c) noexcept {
+  VecOf<Real, N> tau;
   for (int i = 0; i < N; ++i) {
-    tau(i) = std::clamp(-free_rate(i) / (step_s * mobility(i)), -mu_c(i), mu_c(i));
+    tau(i) = limited<Real>(-free_rate(i) / (step_s * mobility(i)), -mu_c(i), mu_c(i));
   }
   return tau;
 }

@@ -1,0 +1,2 @@
+#define EQUIPOISE_ISA avx512
+#include "robots/lanes/roll_isa.hpp"

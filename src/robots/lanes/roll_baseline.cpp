@@ -1,0 +1,2 @@
+#define EQUIPOISE_ISA baseline
+#include "robots/lanes/roll_isa.hpp"
