@@ -9,7 +9,7 @@
 #include <array>
 
 #include "app/sim/workers.hpp"
-#include "equipoise/plant/lanes.hpp"
+#include "robots/lanes/roll.hpp"
 #include "python/simulation.hpp"
 
 namespace equipoise::python {
@@ -91,10 +91,10 @@ class Episodes {
     };
     // In groups that fill the vector registers, as far as every thread has one; nobody's numbers depend on
     // them.
-    const int group = std::clamp((count() + workers_.threads() - 1) / workers_.threads(), 1, kLanes);
+    const int group = std::clamp((count() + workers_.threads() - 1) / workers_.threads(), 1, kRobotsTogether);
     workers_.each((count() + group - 1) / group, [&](int job) {
       const int end = std::min(count(), (job + 1) * group);
-      std::array<Episode*, kLanes> members{};
+      std::array<Episode*, kRobotsTogether> members{};
       int n = 0;
       for (int i = job * group; i < end; ++i) {
         if (active(i)) members[static_cast<std::size_t>(n++)] = at(i).get();

@@ -82,9 +82,9 @@ class SimulatedOf : public Simulated {
 
   void advance_together(Episode* const* episodes, int count) const override {
     if constexpr (RollsTogether<World>::value) {
-      std::array<typename World::Rolling, kLanes> numbers;
-      std::array<typename World::Rolling*, kLanes> rolling{};
-      std::array<RollingEpisode*, kLanes> of{};
+      std::array<typename World::Rolling, kRobotsTogether> numbers;
+      std::array<typename World::Rolling*, kRobotsTogether> rolling{};
+      std::array<RollingEpisode*, kRobotsTogether> of{};
       std::size_t n = 0;
       for (int i = 0; i < count; ++i) {
         auto* episode = static_cast<RollingEpisode*>(episodes[i]);
