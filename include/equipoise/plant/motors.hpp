@@ -52,8 +52,9 @@ class SimulatedMotors {
     command_ = command;
     for (std::size_t i = 0; i < N; ++i) {
       const double duty = calibration_.motor_sign[i] * command.duty[i];
-      if (diode_drop_V_ == 0.0) {
+      if (motor_.bridge == BridgeType::kDriveBrake) {
         bridges_.brake[i] = duty;
+      } else if (diode_drop_V_ == 0.0) {
         bridges_.coast[i] = DriveCoastCommand(motor_.T_r(), duty);
       } else {
         held_with_drop_[i] = DriveCoastDropCommand(motor_.T_r(), duty);
@@ -65,18 +66,18 @@ class SimulatedMotors {
 
   Vec<N> torque(const Vec<N>& wheel_rate_rad_s) const noexcept {
     if (!command_.enable) return Vec<N>::Zero();  // all switches open: the current decays at once
-    if (diode_drop_V_ == 0.0) return bridges_.torque(motor_.bridge, wheel_rate_rad_s);
+    if (!drops()) return bridges_.torque(motor_.bridge, wheel_rate_rad_s);
     Vec<N> torque;
     for (int i = 0; i < N; ++i) {
-      const auto k = static_cast<std::size_t>(i);
+      const double omega_r = wheel_rate_rad_s(i) / bridges_.no_load_rad_s;
       torque(i) = bridges_.stall_torque_N_m *
-                  current_over_stall(k, wheel_rate_rad_s(i) / bridges_.no_load_rad_s);
+                  held_with_drop_[static_cast<std::size_t>(i)].mean_current(omega_r, diodes_oppose_);
     }
     return torque;
   }
   /// Where they drop nothing and are enabled: all there is to a torque.
   const BridgesOf<double, N>* bridges() const noexcept {
-    return command_.enable && diode_drop_V_ == 0.0 ? &bridges_ : nullptr;
+    return command_.enable && !drops() ? &bridges_ : nullptr;
   }
   BridgeType type() const noexcept { return motor_.bridge; }
 
@@ -98,16 +99,13 @@ class SimulatedMotors {
   double damping_N_m_s() const noexcept { return torque_scale_ * back_emf_scale_ * motor_.k2(); }
 
  private:
+  /// Diodes carry the current of a drive/coast bridge alone.
+  bool drops() const noexcept { return diode_drop_V_ != 0.0 && motor_.bridge == BridgeType::kDriveCoast; }
   /// What follows from the battery's voltage.
   void supplied() noexcept {
     bridges_.stall_torque_N_m = torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
     bridges_.no_load_rad_s = motor_.no_load_rad_s(battery_V_) / back_emf_scale_;
     diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
-  }
-  double current_over_stall(std::size_t k, double omega_r) const noexcept {
-    if (motor_.bridge == BridgeType::kDriveBrake)
-      return calibration_.motor_sign[k] * command_.duty[k] - omega_r;
-    return held_with_drop_[k].mean_current(omega_r, diodes_oppose_);
   }
 
   MotorParameters motor_;

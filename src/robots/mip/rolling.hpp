@@ -102,11 +102,11 @@ VecOf<Real, 2> friction_torque(const MipRollingOf<Real>& robot, const Body& body
   return coulomb_torque<Real, 2>(robot.wheel_rates(next), mobility, h, limit);
 }
 
-/// A step of `h` seconds. `motors(rates)`: torque of each, nominal; `limit(rates)`: of friction;
+/// A step of `h` seconds; `facing`: at its beginning. `motors(rates)`: torque of each, nominal; `limit(rates)`: of friction;
 /// `feel(accelerations)`: at its beginning.
 template <class Real, class Body, class Motors, class Limit, class Feel>
-void step(MipRollingOf<Real>* robot, const Body& body, double h, Motors&& motors, Limit&& limit,
-          Feel&& feel) noexcept {
+void step(MipRollingOf<Real>* robot, const Body& body, const MipFacingOf<Real>& facing, double h,
+          Motors&& motors, Limit&& limit, Feel&& feel) noexcept {
   using State = MipStateOf<Real>;
   using V2 = VecOf<Real, 2>;
   const State s = Eigen::Map<const State>(robot->state);
@@ -121,7 +121,6 @@ void step(MipRollingOf<Real>* robot, const Body& body, double h, Motors&& motors
     return robot->gear_torque(rate, motors(rate));
   };
   const V2 gear = gear_torque(s);
-  const MipFacingOf<Real> facing(s);
   const V2 friction = friction_torque<Real>(*robot, body, s, facing, gear, limit(rates), h);
   const VecOf<Real, 3> now = body.accelerations(s, facing, gear + friction);
   feel(now);
@@ -137,11 +136,17 @@ template <class Real>
 void roll(MipRollingOf<Real>* robot, BridgeType type, int steps, double h) noexcept {
   using V2 = VecOf<Real, 2>;
   const MipLevelOf<Real> level{MipDynamicsOf<Real>(robot->bodies)};
+  using State = MipStateOf<Real>;
+  State before = Eigen::Map<const State>(robot->state);
+  MipFacingOf<Real> facing(before);
   for (int i = 0; i < steps; ++i) {
     step(
-        robot, level, h, [&](const V2& rates) { return robot->bridges.torque(type, rates); },
+        robot, level, facing, h, [&](const V2& rates) { return robot->bridges.torque(type, rates); },
         [&](const V2&) { return V2(robot->coulomb_N_m[0], robot->coulomb_N_m[1]); },
         [](const VecOf<Real, 3>&) {});
+    const State now = Eigen::Map<const State>(robot->state);
+    facing = MipFacingOf<Real>(facing, now, before);
+    before = now;
   }
 }
 

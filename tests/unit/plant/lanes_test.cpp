@@ -33,6 +33,15 @@ TEST(Lanes, LogarithmIsExactToTheLastDigits) {
   }
 }
 
+TEST(Lanes, SinesAreExactToTheLastDigits) {
+  for (double x = 1e-12; x < 1e6; x *= 1.031) {
+    EXPECT_NEAR(sin(two(x, -x))[0], std::sin(x), 3e-16) << x;
+    EXPECT_NEAR(sin(two(x, -x))[1], -std::sin(x), 3e-16) << x;
+    EXPECT_NEAR(cos(two(x, -x))[0], std::cos(x), 3e-16) << x;
+    EXPECT_NEAR(cos(two(x, -x))[1], std::cos(x), 3e-16) << x;
+  }
+}
+
 TEST(Lanes, AChoiceIsMadeInEachLane) {
   const Lanes<Two> a = two(1.0, -3.0);
   EXPECT_EQ(abs(a)[1], 3.0);
