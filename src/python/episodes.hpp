@@ -9,8 +9,8 @@
 #include <array>
 
 #include "app/sim/workers.hpp"
-#include "robots/lanes/roll.hpp"
 #include "python/simulation.hpp"
+#include "robots/lanes/roll.hpp"
 
 namespace equipoise::python {
 

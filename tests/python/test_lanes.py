@@ -7,7 +7,6 @@ import subprocess
 from pathlib import Path
 
 import pytest
-
 from equipoise_tools.paths import repository_root
 
 OBJECTS = sorted((repository_root() / "build/host/CMakeFiles").glob("**/src/robots/lanes/roll_*.o"))

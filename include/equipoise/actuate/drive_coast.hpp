@@ -47,7 +47,8 @@ Real DriveCoastCommandOf<Real>::mean_current(const Real& omega_r) const noexcept
   const auto continuous = unlimited || off_decay_ < d * full_decay_;
   if (all(continuous)) return flows_on;
   const Real passes = d / b * drained_;
-  const Real stops = sign_ * 2.0 * (v_ * d - b / T_r_ * log1p(select(continuous, Real(0.0), passes)));  // (4.30)
+  const Real stops =
+      sign_ * 2.0 * (v_ * d - b / T_r_ * log1p(select(continuous, Real(0.0), passes)));  // (4.30)
   return select(continuous, flows_on, stops);
 }
 

@@ -1,8 +1,8 @@
-// Numbers of several robots side by side in a vector register: +, -, *, /, what is used of <cmath>, comparisons
-// that give masks, select(mask, a, b). What is written for a `Real` computes one robot with double and kLanes
-// with Lanes, by the same operations in the same order. `Isa` is of the instruction set that a file is
-// compiled for, LaneTypes<its width>: code of two of them must not be mixed up by the linker. Simulation
-// only; no allocation.
+// Numbers of several robots side by side in a vector register: +, -, *, /, what is used of <cmath>,
+// comparisons that give masks, select(mask, a, b). What is written for a `Real` computes one robot with
+// double and kLanes with Lanes, by the same operations in the same order. `Isa` is of the instruction set
+// that a file is compiled for, LaneTypes<its width>: code of two of them must not be mixed up by the linker.
+// Simulation only; no allocation.
 #pragma once
 
 #include <Eigen/Core>
@@ -66,12 +66,12 @@ struct Lanes {
   /// To the last digit or two up to 1e6 rad.
   friend Lanes sin(const Lanes& a) noexcept { return turned(a, 0); }
   friend Lanes cos(const Lanes& a) noexcept { return turned(a, 1); }
-  /// Of what is not negative, to the last digit or two: with 1 + a = m 2^k and m about 1, log m = 2 atanh(s) by
-  /// its series in s = (m - 1) / (m + 1), at most 0.172.
+  /// Of what is not negative, to the last digit or two: with 1 + a = m 2^k and m about 1, log m = 2 atanh(s)
+  /// by its series in s = (m - 1) / (m + 1), at most 0.172.
   friend Lanes log1p(const Lanes& a) noexcept {
     using Bits = typename Isa::Unsigned;
     constexpr unsigned long long kRootOfHalf = 0x3fe6a09e667f3bcd;  // m lies between it and twice it
-    constexpr unsigned long long kTwoTo52 = 0x4330000000000000;     // an integer below its mantissa is added so
+    constexpr unsigned long long kTwoTo52 = 0x4330000000000000;  // an integer below its mantissa is added so
     constexpr double kLn2 = 0.69314718055994530942;
     const Vector u = 1.0 + a.v;
     const Vector lost = (a.v - (u - 1.0)) / u;  // of a, in rounding

@@ -103,7 +103,8 @@ class SimulatedMotors {
   bool drops() const noexcept { return diode_drop_V_ != 0.0 && motor_.bridge == BridgeType::kDriveCoast; }
   /// What follows from the battery's voltage.
   void supplied() noexcept {
-    bridges_.stall_torque_N_m = torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
+    bridges_.stall_torque_N_m =
+        torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
     bridges_.no_load_rad_s = motor_.no_load_rad_s(battery_V_) / back_emf_scale_;
     diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
   }

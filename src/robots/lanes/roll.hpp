@@ -1,8 +1,7 @@
 // Robots that roll, several at once in the processor's vector registers, by the widest instructions that it
-// has. In: numbers of each, step -> out: their states after the steps, the same numbers as roll() gives one by
-// one but for the last digits. A robot that its Rolling does not describe is
-// stepped by its own world. Simulation only; no
-// allocation.
+// has. In: numbers of each, step -> out: their states after the steps, the same numbers as roll() gives one
+// by one but for the last digits. A robot that its Rolling does not describe is stepped by its own world.
+// Simulation only; no allocation.
 #pragma once
 
 #include "robots/mbbr/rolling.hpp"
@@ -19,7 +18,8 @@ void roll_together(MbbrRollingOf<double>* const* robots, int count, BridgeType t
 void roll_together(MipRollingOf<double>* const* robots, int count, BridgeType type, int steps,
                    double h) noexcept;
 
-/// The same by one instruction set, for tests: "baseline", "avx2", "avx512"; false: this processor has it not.
+/// The same by one instruction set, for tests: "baseline", "avx2", "avx512"; false: this processor has it
+/// not.
 bool roll_together_by(const char* isa, MbbrRollingOf<double>* const* robots, int count, BridgeType type,
                       int steps, double h) noexcept;
 bool roll_together_by(const char* isa, MipRollingOf<double>* const* robots, int count, BridgeType type,

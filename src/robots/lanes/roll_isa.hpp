@@ -1,5 +1,5 @@
-// roll_together() for the instruction set that the including file is compiled for. EQUIPOISE_ISA names it: all
-// code of the file carries the name, so that the linker cannot take it for that of another one.
+// roll_together() for the instruction set that the including file is compiled for. EQUIPOISE_ISA names it:
+// all code of the file carries the name, so that the linker cannot take it for that of another one.
 // EQUIPOISE_LANES: doubles in one of its registers.
 #pragma once
 

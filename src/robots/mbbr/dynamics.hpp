@@ -172,8 +172,7 @@ MbbrDynamicsOf<Real>::MbbrDynamicsOf(const MbbrBodiesOf<Real>& p) noexcept
 template <class Real>
 MbbrMassOf<Real> MbbrDynamicsOf<Real>::mass(const Motion& m) const noexcept {
   const auto& R = m.R();
-  const Real mlr =
-      p_.m_t * p_.l * p_.r;  // [c]x v = l (-v_y, v_x, 0); S maps phi_x' to -e2 and phi_y' to e1
+  const Real mlr = p_.m_t * p_.l * p_.r;  // [c]x v = l (-v_y, v_x, 0); S maps phi_x' to -e2 and phi_y' to e1
   Mass mass;
   mass.C << mlr * R(1, 1) - p_.I_w * R(0, 0), -mlr * R(0, 1) - p_.I_w * R(1, 0),  //
       -mlr * R(1, 0) - p_.I_w * R(0, 1), mlr * R(0, 0) - p_.I_w * R(1, 1),        //
@@ -188,7 +187,7 @@ MbbrMassOf<Real> MbbrDynamicsOf<Real>::mass(const Motion& m) const noexcept {
 
 template <class Real>
 MbbrAccelerationsOf<Real> MbbrDynamicsOf<Real>::solve(const Mass& mass, const V3& b_body,
-                                      const V2& b_ball) const noexcept {
+                                                      const V2& b_ball) const noexcept {
   const V2 rhs = b_ball - mass.DC.transpose() * b_body;
   Accelerations a;
   a.phi_ddot_inertial =
@@ -199,7 +198,7 @@ MbbrAccelerationsOf<Real> MbbrDynamicsOf<Real>::solve(const Mass& mass, const V3
 
 template <class Real>
 MbbrAccelerationsOf<Real> MbbrDynamicsOf<Real>::accelerations(const Motion& m, const Mass& mass,
-                                              const Loads& loads) const noexcept {
+                                                              const Loads& loads) const noexcept {
   const V3& w = m.omega_B;
   const Real ml = p_.m_t * p_.l;
   const V3 e1 = m.R().row(0);
@@ -213,21 +212,21 @@ MbbrAccelerationsOf<Real> MbbrDynamicsOf<Real>::accelerations(const Motion& m, c
   const V3 on_body = loads.push_B - centripetal;
   const V3 on_ball = wheel_gyroscopic + loads.tau_B;
   const V3 b_body = -w.cross(I_t.cwiseProduct(w)) + p_.l * V3(-on_body.y(), on_body.x(), 0.0) -
-                      ml * kGravity_m_s2 * V3(-up_B.y(), up_B.x(), 0.0) - on_ball;
+                    ml * kGravity_m_s2 * V3(-up_B.y(), up_B.x(), 0.0) - on_ball;
   const V2 b_ball(-p_.r * (e2.dot(on_body) + loads.pull_star.y()) + e1.dot(on_ball),
-                    p_.r * (e1.dot(on_body) + loads.pull_star.x()) + e2.dot(on_ball));
+                  p_.r * (e1.dot(on_body) + loads.pull_star.x()) + e2.dot(on_ball));
   return solve(mass, b_body, b_ball);
 }
 
 template <class Real>
 MbbrAccelerationsOf<Real> MbbrDynamicsOf<Real>::response(const Motion& m, const Mass& mass,
-                                         const V3& tau_B) const noexcept {
+                                                         const V3& tau_B) const noexcept {
   return solve(mass, -tau_B, m.R().template topRows<2>() * tau_B);
 }
 
 template <class Real>
 VecOf<Real, 3> MbbrDynamicsOf<Real>::accelerometer_B(const Motion& m, const Accelerations& a,
-                                   const V3& arm_B) const noexcept {
+                                                     const V3& arm_B) const noexcept {
   const V2 ball = ball_velocity(p_.r, a.phi_ddot_inertial);
   const V3 gravity_minus_ball(-ball.x(), -ball.y(), -kGravity_m_s2);
   return m.R().transpose() * gravity_minus_ball - a.omega_dot_B.cross(arm_B) -

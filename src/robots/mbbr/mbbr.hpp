@@ -100,7 +100,9 @@ template <class Real>
 VecOf<Real, 2> ball_velocity(const Real& r, const VecOf<Real, 2>& phi_dot) noexcept {
   return {r * phi_dot.y(), -r * phi_dot.x()};
 }
-inline Vec2 ball_velocity(double r, const Vec2& phi_dot) noexcept { return ball_velocity<double>(r, phi_dot); }
+inline Vec2 ball_velocity(double r, const Vec2& phi_dot) noexcept {
+  return ball_velocity<double>(r, phi_dot);
+}
 inline Vec2 ball_rate(double r, const Vec2& velocity) noexcept {
   return {-velocity.y() / r, velocity.x() / r};
 }

@@ -1,7 +1,7 @@
-// One instant of an MBBR whose ball rolls: forces, accelerations, derivative, friction of a step. Real: double
-// or Lanes. In: state, dynamics, drive, loads -> out: derivative of the state. `Drive` says what motors and
-// wheels do: wheel_torques(relative rate), torque_B(wheel torque, friction), seen_rate_B(relative rate), all
-// as MbbrDrive. Simulation only; no allocation.
+// One instant of an MBBR whose ball rolls: forces, accelerations, derivative, friction of a step. Real:
+// double or Lanes. In: state, dynamics, drive, loads -> out: derivative of the state. `Drive` says what
+// motors and wheels do: wheel_torques(relative rate), torque_B(wheel torque, friction), seen_rate_B(relative
+// rate), all as MbbrDrive. Simulation only; no allocation.
 #pragma once
 
 #include "equipoise/plant/coulomb.hpp"
@@ -12,8 +12,8 @@
 namespace equipoise {
 
 /// Attitude, body rates, ball rates (yaw frame), ball angles (inertial, of its centre's path), relative ball
-/// angle, slip of the floor contact (yaw frame, m/s), spin; 3 + 3 + 2 + 2 + 3 + 2 + 1. The last three are zero
-/// while the ball rolls.
+/// angle, slip of the floor contact (yaw frame, m/s), spin; 3 + 3 + 2 + 2 + 3 + 2 + 1. The last three are
+/// zero while the ball rolls.
 template <class Real>
 using MbbrStateOf = VecOf<Real, 16>;
 namespace mbbr_at {
@@ -33,8 +33,8 @@ struct MbbrHereOf {
   }
   /// Within a step from `before`, turned by `by_rad` since.
   MbbrHereOf(const MbbrHereOf& before, const State& s, const Real& by_rad) noexcept
-      : motion(before.motion, s.template segment<2>(mbbr_at::kTheta),
-               s.template segment<3>(mbbr_at::kOmega), s.template segment<2>(mbbr_at::kPhiDot)),
+      : motion(before.motion, s.template segment<2>(mbbr_at::kTheta), s.template segment<3>(mbbr_at::kOmega),
+               s.template segment<2>(mbbr_at::kPhiDot)),
         heading(before.heading.near(s(mbbr_at::kTheta + 2), by_rad)) {
     turn(s);
   }
@@ -91,8 +91,7 @@ struct MbbrInstantOf : MbbrHereOf<Real> {
     const V3 theta_dot = motion.theta_dot();
     d.template segment<3>(mbbr_at::kTheta) = theta_dot;
     d.template segment<3>(mbbr_at::kOmega) = a.omega_dot_B;
-    d.template segment<2>(mbbr_at::kPhiDot) =
-        MbbrDynamicsOf<Real>::phi_star_ddot(motion, a, theta_dot.z());
+    d.template segment<2>(mbbr_at::kPhiDot) = MbbrDynamicsOf<Real>::phi_star_ddot(motion, a, theta_dot.z());
     d.template segment<2>(mbbr_at::kPhi) = heading(motion.phi_dot_star);
     d.template segment<3>(mbbr_at::kRelative) = wheels.seen_rate_B(relative_B);
     d.template segment<3>(mbbr_at::kSlip).setZero();
@@ -178,8 +177,7 @@ void roll(MbbrRollingOf<Real>* robot, BridgeType type, int steps, double h) noex
     free.roll(dynamics);
     const VecOf<Real, 3> friction = uncoupled_coulomb_torque<Real, 3>(
         free.relative_after(h), mobility, h,
-        sliding_friction_N_m(robot->coulomb_N_m, robot->yaw_positive, robot->yaw_negative,
-                             free.relative_B));
+        sliding_friction_N_m(robot->coulomb_N_m, robot->yaw_positive, robot->yaw_negative, free.relative_B));
     const Instant now = free.with_friction(dynamics, drive, friction);
     const State next = rk4_step(s, State(now.derivative(drive)), h, [&](const State& at) {
       Instant then(MbbrHereOf<Real>(here, at, at(mbbr_at::kTheta + 2) - s(mbbr_at::kTheta + 2)));

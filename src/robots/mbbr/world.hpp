@@ -38,8 +38,8 @@ class MbbrWorld {
   /// Advances one tick with the bridges as commanded.
   void advance(const MotorCommand& command);
 
-  /// The same tick in two halves, where nothing is on that MbbrRollingOf leaves out: what the steps depend on,
-  /// if so; and their end. Between them roll() or roll_together().
+  /// The same tick in two halves, where nothing is on that MbbrRollingOf leaves out: what the steps depend
+  /// on, if so; and their end. Between them roll() or roll_together().
   bool begin_rolling(const MotorCommand& command, Rolling* robot) noexcept;
   void end_rolling(const Rolling& robot) noexcept;
   BridgeType bridge() const noexcept { return motors_.type(); }

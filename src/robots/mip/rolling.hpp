@@ -54,10 +54,10 @@ struct MipRollingOf {
   Real state[8];
   MipBodiesOf<Real> bodies;
   Real yaw_to_wheel;
-  Real viscous_N_m_s;     // of a wheel
-  Real coulomb_N_m[2];    // of each wheel, at most
-  Real motor_gain[2];     // torque of each motor over nominal
-  Real mobility[4];       // of the wheels' encoder rates; symmetric
+  Real viscous_N_m_s;   // of a wheel
+  Real coulomb_N_m[2];  // of each wheel, at most
+  Real motor_gain[2];   // torque of each motor over nominal
+  Real mobility[4];     // of the wheels' encoder rates; symmetric
   GearPlayParamsOf<Real> gear;
   GearPlayOf<Real> gears[2];
   Real engaged[2];  // 1: teeth in contact
@@ -102,19 +102,19 @@ VecOf<Real, 2> friction_torque(const MipRollingOf<Real>& robot, const Body& body
   return coulomb_torque<Real, 2>(robot.wheel_rates(next), mobility, h, limit);
 }
 
-/// A step of `h` seconds; `facing`: at its beginning. `motors(rates)`: torque of each, nominal; `limit(rates)`: of friction;
+/// A step of `h` seconds, or a part of it, `part_h`: friction is that of the whole. `facing`: at its
+/// beginning. `motors(rates)`: torque of each, nominal; `limit(rates)`: of friction;
 /// `feel(accelerations)`: at its beginning.
 template <class Real, class Body, class Motors, class Limit, class Feel>
 void step(MipRollingOf<Real>* robot, const Body& body, const MipFacingOf<Real>& facing, double h,
-          Motors&& motors, Limit&& limit, Feel&& feel) noexcept {
+          double part_h, Motors&& motors, Limit&& limit, Feel&& feel) noexcept {
   using State = MipStateOf<Real>;
   using V2 = VecOf<Real, 2>;
   const State s = Eigen::Map<const State>(robot->state);
   const V2 rates = robot->wheel_rates(s);
   const V2 crossing = motors(V2(rates + V2(robot->gears[0].rate_rad_s(), robot->gears[1].rate_rad_s())));
   for (int i = 0; i < 2; ++i) {  // the motor's side of each gear
-    robot->engaged[i] =
-        select(robot->gears[i].step(robot->gear, crossing(i), h), Real(1.0), Real(0.0));
+    robot->engaged[i] = select(robot->gears[i].step(robot->gear, crossing(i), part_h), Real(1.0), Real(0.0));
   }
   const auto gear_torque = [&](const State& at) {
     const V2 rate = robot->wheel_rates(at);
@@ -125,7 +125,7 @@ void step(MipRollingOf<Real>* robot, const Body& body, const MipFacingOf<Real>& 
   const VecOf<Real, 3> now = body.accelerations(s, facing, gear + friction);
   feel(now);
   Eigen::Map<State>(robot->state) =
-      rk4_step(s, derivative(body, s, facing, now), h, [&](const State& at) {
+      rk4_step(s, derivative(body, s, facing, now), part_h, [&](const State& at) {
         const MipFacingOf<Real> turned(facing, at, s);
         return derivative(body, at, turned, body.accelerations(at, turned, gear_torque(at) + friction));
       });
@@ -141,7 +141,7 @@ void roll(MipRollingOf<Real>* robot, BridgeType type, int steps, double h) noexc
   MipFacingOf<Real> facing(before);
   for (int i = 0; i < steps; ++i) {
     step(
-        robot, level, facing, h, [&](const V2& rates) { return robot->bridges.torque(type, rates); },
+        robot, level, facing, h, h, [&](const V2& rates) { return robot->bridges.torque(type, rates); },
         [&](const V2&) { return V2(robot->coulomb_N_m[0], robot->coulomb_N_m[1]); },
         [](const VecOf<Real, 3>&) {});
     const State now = Eigen::Map<const State>(robot->state);

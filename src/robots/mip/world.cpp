@@ -131,7 +131,8 @@ void MipWorld::step(double h) noexcept {
     now_.state[kPsiDot] = 0.0;
   }
   equipoise::step(
-      &now_, Body{*this}, Facing(s()), h, [this](const Vec2& rates) { return motors_.torque(rates); },
+      &now_, Body{*this}, Facing(s()), world_.common.step_s, h,
+      [this](const Vec2& rates) { return motors_.torque(rates); },
       [this](const Vec2& rates) { return friction_limit(rates); },
       [this](const Vec3& accelerations) {
         if (sensors_.aged()) sensors_.feel(felt(accelerations));
