@@ -28,7 +28,7 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
       accel_noise_(world.seed, kAccelNoise),
       encoder_noise_(world.seed, kEncoderNoise),
       attitude_noise_(world.seed, kAttitudeNoise) {
-  aged_ = world.gyro_age_s() > 0.0 || world.accel_age_s() > 0.0 || world.encoder_sample_age_s > 0.0;
+  aged_ = world.aged();
   misaligned_ = !world.imu_misalignment_rad.isZero(0.0);
   const double turn = world.imu_misalignment_rad.norm();
   R_misaligned_ = misaligned_ ? Eigen::AngleAxisd(turn, world.imu_misalignment_rad / turn).toRotationMatrix()

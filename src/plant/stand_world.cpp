@@ -36,8 +36,8 @@ void StandWorld::advance(const MotorCommand& command) {
       const double driven = torque(static_cast<Eigen::Index>(i)) - stand_.viscous_N_m_s * rate_[i];
       const double mobility = 1.0 / stand_.wheel_inertia_kg_m2;
       const Vec<1> free(rate_[i] + h * mobility * driven);
-      const double net =
-          driven + uncoupled_coulomb_torque<1>(free, Vec<1>(mobility), h, Vec<1>(stand_.coulomb_N_m))(0);
+      const double net = driven + uncoupled_coulomb_torque<double, 1>(free, Vec<1>(mobility), h,
+                                                                      Vec<1>(stand_.coulomb_N_m))(0);
       rate_[i] += h * mobility * net;
       angle_[i] += h * rate_[i];
       on_body -= stand_.axis_B[i] * net;  // motor and gear hold on to the body

@@ -10,6 +10,7 @@
 
 #include "app/sim/workers.hpp"
 #include "python/simulation.hpp"
+#include "robots/lanes/roll.hpp"
 
 namespace equipoise::python {
 
@@ -69,8 +70,7 @@ class Episodes {
         throw nb::value_error("active, rewards and lost have an element per episode");
     }
     const nb::gil_scoped_release others;
-    workers_.each(count(), [&](int i) {
-      if (!active(i)) return;
+    const auto one = [&](int i) {
       const double* asked = actions.data() + std::ptrdiff_t{i} * wheels_;
       std::array<double, kMaxMotors> drive{};
       double acted = 0.0;
@@ -88,6 +88,21 @@ class Episodes {
       }
       rewards(i) = is_lost ? 0.0 : 1.0 - std::min(cost, 1.0);
       if (lost(i) != is_lost) lost(i) = is_lost;  // one cache line of all threads: left alone where it can be
+    };
+    // In groups that fill the vector registers, as far as every thread has one; nobody's numbers depend on
+    // them.
+    const int group = std::clamp((count() + workers_.threads() - 1) / workers_.threads(), 1, kRobotsTogether);
+    workers_.each((count() + group - 1) / group, [&](int job) {
+      const int end = std::min(count(), (job + 1) * group);
+      std::array<Episode*, kRobotsTogether> members{};
+      int n = 0;
+      for (int i = job * group; i < end; ++i) {
+        if (active(i)) members[static_cast<std::size_t>(n++)] = at(i).get();
+      }
+      robot_.advance_together(members.data(), n);
+      for (int i = job * group; i < end; ++i) {
+        if (active(i)) one(i);
+      }
     });
   }
   StateView truth(int i) { return at(i)->truth(); }

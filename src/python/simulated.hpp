@@ -6,8 +6,29 @@
 #include "app/sim/simulated_run.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "python/simulation.hpp"
+#include "robots/lanes/roll.hpp"
 
 namespace equipoise::python {
+
+/// A world whose next tick may have been advanced already, together with others'.
+template <class World>
+class Ahead : public World {
+ public:
+  explicit Ahead(const World& world) : World(world) {}
+
+  void is_ahead() noexcept { ahead_ = true; }
+  void advance(const MotorCommand& command) {
+    if (!std::exchange(ahead_, false)) World::advance(command);
+  }
+
+ private:
+  bool ahead_ = false;
+};
+
+template <class World, class = void>
+struct RollsTogether : std::false_type {};
+template <class World>
+struct RollsTogether<World, std::void_t<typename World::Rolling>> : std::true_type {};
 
 template <class Firmware, class Access>
 class SimulatedOf : public Simulated {
@@ -57,6 +78,25 @@ class SimulatedOf : public Simulated {
         return std::unique_ptr<Episode>(std::make_unique<EpisodeOf<Own>>(config, seeded, own.params()));
       });
     };
+  }
+
+  void advance_together(Episode* const* episodes, int count) const override {
+    if constexpr (RollsTogether<World>::value) {
+      std::array<typename World::Rolling, kRobotsTogether> numbers;
+      std::array<typename World::Rolling*, kRobotsTogether> rolling{};
+      std::array<RollingEpisode*, kRobotsTogether> of{};
+      std::size_t n = 0;
+      for (int i = 0; i < count; ++i) {
+        auto* episode = static_cast<RollingEpisode*>(episodes[i]);
+        if (!episode->begin(&numbers[n])) continue;
+        rolling[n] = &numbers[n];
+        of[n++] = episode;
+      }
+      if (n == 0) return;
+      const World& any = of[0]->world();  // all of one configuration, but for what is drawn
+      roll_together(rolling.data(), static_cast<int>(n), any.bridge(), any.steps_per_tick(), any.step_s());
+      for (std::size_t i = 0; i < n; ++i) of[i]->end(numbers[i]);
+    }
   }
 
   void calibrate(const std::string& toml, const std::vector<RawSample>& raw, double* out) const override {
@@ -113,14 +153,36 @@ class SimulatedOf : public Simulated {
     });
   }
 
+  /// Whose world may be advanced together with others'.
+  class RollingEpisode : public Episode {
+   public:
+    template <class Rolling>
+    bool begin(Rolling* robot) noexcept {
+      const MotorCommand* command = next_command();
+      return command != nullptr && world_.begin_rolling(*command, robot);
+    }
+    template <class Rolling>
+    void end(const Rolling& robot) noexcept {
+      world_.end_rolling(robot);
+      world_.is_ahead();
+    }
+    const World& world() const noexcept { return world_; }
+
+   protected:
+    explicit RollingEpisode(const World& world) : world_(world) {}
+    virtual const MotorCommand* next_command() const noexcept = 0;
+
+    Ahead<World> world_;
+  };
+
   /// Stands up under its own feedback; from then on the action takes its place.
   template <class Own>
-  class EpisodeOf : public Episode {
+  class EpisodeOf : public RollingEpisode {
    public:
     EpisodeOf(const Config& config, const app::SimRequest& request, const typename Own::Params& params)
-        : kinematics_(config.robot),
+        : RollingEpisode(Firmware::world(config, fidelity_level(request.choice.fidelity), request.seed)),
+          kinematics_(config.robot),
           robot_(config.robot),
-          world_(Firmware::world(config, fidelity_level(request.choice.fidelity), request.seed)),
           pipeline_(app::hooked<Own>(params,
                                      [this](const Reference& r, const Input& own) -> Input {
                                        reference_ = r;
@@ -147,17 +209,20 @@ class SimulatedOf : public Simulated {
     }
     StateView truth() const override { return view(world_.truth(), robot_); }
 
+   protected:
+    const MotorCommand* next_command() const noexcept override { return run_.next_command(); }
+
    private:
+    using RollingEpisode::world_;
     typename Robot::Kinematics kinematics_;
     typename Robot::Parameters robot_;
-    World world_;
     Reference reference_{};
     Input u_ = Input::Zero();
     bool acts_ = false;
     app::Hooked<Own> pipeline_;
     app::TickObserver observe_;
     std::atomic<bool> stop_{false};
-    app::SimulatedRun<Firmware, World, app::Hooked<Own>, app::Figures::kNone> run_;
+    app::SimulatedRun<Firmware, Ahead<World>, app::Hooked<Own>, app::Figures::kNone> run_;
   };
 };
 

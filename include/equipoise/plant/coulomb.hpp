@@ -25,29 +25,31 @@ struct Stiction {
 };
 
 /// Axes that do not influence each other, each with its own limit; `mobility`: 1/effective inertia of each.
-template <int N>
-Vec<N> uncoupled_coulomb_torque(const Vec<N>& free_rate, const Vec<N>& mobility, double step_s,
-                                const Vec<N>& mu_c) noexcept {
-  Vec<N> tau;
+template <class Real, int N>
+VecOf<Real, N> uncoupled_coulomb_torque(const VecOf<Real, N>& free_rate, const VecOf<Real, N>& mobility,
+                                        double step_s, const VecOf<Real, N>& mu_c) noexcept {
+  VecOf<Real, N> tau;
   for (int i = 0; i < N; ++i) {
-    tau(i) = std::clamp(-free_rate(i) / (step_s * mobility(i)), -mu_c(i), mu_c(i));
+    tau(i) = limited<Real>(-free_rate(i) / (step_s * mobility(i)), -mu_c(i), mu_c(i));
   }
   return tau;
 }
 
 /// Coupled axes, each with its own limit: the same rule by projected Gauss-Seidel sweeps.
-template <int N>
-Vec<N> coulomb_torque(const Vec<N>& free_rate, const Mat<N, N>& mobility, double step_s,
-                      const Vec<N>& mu_c) noexcept {
+template <class Real, int N>
+VecOf<Real, N> coulomb_torque(const VecOf<Real, N>& free_rate, const MatOf<Real, N, N>& mobility,
+                              double step_s, const VecOf<Real, N>& mu_c) noexcept {
   constexpr int kSweeps = 20;
-  Vec<N> tau = Vec<N>::Zero();
+  VecOf<Real, N> tau = VecOf<Real, N>::Zero();
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    const Vec<N> before = tau;
+    auto same = tau(0) == tau(0);
     for (int i = 0; i < N; ++i) {
-      const double rate = free_rate(i) + step_s * mobility.row(i).dot(tau);
-      tau(i) = std::clamp(tau(i) - rate / (step_s * mobility(i, i)), -mu_c(i), mu_c(i));
+      const Real before = tau(i);
+      const Real rate = free_rate(i) + step_s * mobility.row(i).dot(tau);
+      tau(i) = limited<Real>(tau(i) - rate / (step_s * mobility(i, i)), -mu_c(i), mu_c(i));
+      same = same && tau(i) == before;
     }
-    if (tau == before) break;  // every further sweep would say the same
+    if (all(same)) break;  // every further sweep would say the same
   }
   return tau;
 }

@@ -12,6 +12,27 @@
 
 namespace equipoise {
 
+/// The bridges of a robot whose diodes drop nothing, under the commands that they hold. A command of a
+/// drive/brake bridge is its duty.
+template <class Real, int N>
+struct BridgesOf {
+  std::array<DriveCoastCommandOf<Real>, N> coast{};  // the integrator asks at many speeds per command
+  std::array<Real, N> brake{};
+  Real stall_torque_N_m{0.0};
+  Real no_load_rad_s{1.0};
+
+  VecOf<Real, N> torque(BridgeType type, const VecOf<Real, N>& wheel_rate_rad_s) const noexcept {
+    VecOf<Real, N> torque;
+    for (int i = 0; i < N; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const Real omega_r = wheel_rate_rad_s(i) / no_load_rad_s;
+      torque(i) = stall_torque_N_m *
+                  (type == BridgeType::kDriveBrake ? brake[k] - omega_r : coast[k].mean_current(omega_r));
+    }
+    return torque;
+  }
+};
+
 template <int N>
 class SimulatedMotors {
  public:
@@ -31,8 +52,10 @@ class SimulatedMotors {
     command_ = command;
     for (std::size_t i = 0; i < N; ++i) {
       const double duty = calibration_.motor_sign[i] * command.duty[i];
-      if (diode_drop_V_ == 0.0) {
-        held_[i] = DriveCoastCommand(motor_.T_r(), duty);
+      if (motor_.bridge == BridgeType::kDriveBrake) {
+        bridges_.brake[i] = duty;
+      } else if (diode_drop_V_ == 0.0) {
+        bridges_.coast[i] = DriveCoastCommand(motor_.T_r(), duty);
       } else {
         held_with_drop_[i] = DriveCoastDropCommand(motor_.T_r(), duty);
       }
@@ -42,14 +65,21 @@ class SimulatedMotors {
   double battery_V() const noexcept { return battery_V_; }
 
   Vec<N> torque(const Vec<N>& wheel_rate_rad_s) const noexcept {
-    Vec<N> torque = Vec<N>::Zero();
-    if (!command_.enable) return torque;  // all switches open: the current decays at once
+    if (!command_.enable) return Vec<N>::Zero();  // all switches open: the current decays at once
+    if (!drops()) return bridges_.torque(motor_.bridge, wheel_rate_rad_s);
+    Vec<N> torque;
     for (int i = 0; i < N; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      torque(i) = stall_torque_N_m_ * current_over_stall(k, wheel_rate_rad_s(i) / no_load_rad_s_);
+      const double omega_r = wheel_rate_rad_s(i) / bridges_.no_load_rad_s;
+      torque(i) = bridges_.stall_torque_N_m *
+                  held_with_drop_[static_cast<std::size_t>(i)].mean_current(omega_r, diodes_oppose_);
     }
     return torque;
   }
+  /// Where they drop nothing and are enabled: all there is to a torque.
+  const BridgesOf<double, N>* bridges() const noexcept {
+    return command_.enable && !drops() ? &bridges_ : nullptr;
+  }
+  BridgeType type() const noexcept { return motor_.bridge; }
 
   /// Terminal voltage under the mean supply current; a bridge's is |duty| times the motor current while
   /// driven.
@@ -58,7 +88,7 @@ class SimulatedMotors {
     double supply_A = 0.0;
     for (int i = 0; i < N && command_.enable; ++i) {
       const double duty = command_.duty[static_cast<std::size_t>(i)];
-      const double omega_r = wheel_rate_rad_s(i) / no_load_rad_s_;
+      const double omega_r = wheel_rate_rad_s(i) / bridges_.no_load_rad_s;
       supply_A += std::abs(duty * motor_.stall_current_A(battery_V_) * (duty - omega_r));
     }
     battery_V_ = open_V_ - resistance_ohm_ * supply_A;
@@ -69,17 +99,14 @@ class SimulatedMotors {
   double damping_N_m_s() const noexcept { return torque_scale_ * back_emf_scale_ * motor_.k2(); }
 
  private:
+  /// Diodes carry the current of a drive/coast bridge alone.
+  bool drops() const noexcept { return diode_drop_V_ != 0.0 && motor_.bridge == BridgeType::kDriveCoast; }
   /// What follows from the battery's voltage.
   void supplied() noexcept {
-    stall_torque_N_m_ = torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
-    no_load_rad_s_ = motor_.no_load_rad_s(battery_V_) / back_emf_scale_;
+    bridges_.stall_torque_N_m =
+        torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
+    bridges_.no_load_rad_s = motor_.no_load_rad_s(battery_V_) / back_emf_scale_;
     diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
-  }
-  double current_over_stall(std::size_t k, double omega_r) const noexcept {
-    if (motor_.bridge == BridgeType::kDriveBrake)
-      return calibration_.motor_sign[k] * command_.duty[k] - omega_r;
-    if (diode_drop_V_ == 0.0) return held_[k].mean_current(omega_r);
-    return held_with_drop_[k].mean_current(omega_r, diodes_oppose_);
   }
 
   MotorParameters motor_;
@@ -90,11 +117,9 @@ class SimulatedMotors {
   double resistance_ohm_;
   double diode_drop_V_;
   double battery_V_;
-  double stall_torque_N_m_ = 0.0;
-  double no_load_rad_s_ = 0.0;
   double diodes_oppose_ = 1.0;
   MotorCommand command_{};
-  std::array<DriveCoastCommand, N> held_{};  // the integrator asks at many speeds per command
+  BridgesOf<double, N> bridges_;
   std::array<DriveCoastDropCommand, N> held_with_drop_{};
 };
 

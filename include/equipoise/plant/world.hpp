@@ -82,6 +82,15 @@ struct WorldParams {
   double rolling_resistance = 0.0;           // of the weight
   ActualScales actual;
 
+  /// A level floor, nobody who pushes, bridges that follow at once and drop nothing, sensors of now.
+  bool plain() const noexcept {
+    return pushes.empty() && floor_slope_rad.isZero(0.0) && rolling_resistance == 0.0 &&
+           stiction.static_ratio == 1.0 && diode_drop_V == 0.0 && actuation_steps() == 0.0 && !aged();
+  }
+  /// A sensor reports the past.
+  bool aged() const noexcept {
+    return gyro_age_s() > 0.0 || accel_age_s() > 0.0 || encoder_sample_age_s > 0.0;
+  }
   double gyro_age_s() const noexcept {
     return imu_sample_age_s + (imu_low_pass > 0 ? imu_delay_scale * imu_gyro_delay_s(imu_low_pass) : 0.0);
   }

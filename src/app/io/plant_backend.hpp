@@ -11,6 +11,9 @@ class PlantBackend {
  public:
   explicit PlantBackend(World& world) : world_(world) {}
 
+  /// What the next tick is advanced under.
+  const MotorCommand& command() const noexcept { return command_; }
+
   rio_t io() noexcept {
     static const rio_ops_t ops{wait_tick, read_sensors, write_motors, motors_off, close};
     return {&ops, this};

@@ -40,6 +40,8 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
+  int threads() const noexcept { return static_cast<int>(shares_.size()); }
+
   void each(int count, const std::function<void(int)>& job) {
     const auto threads = static_cast<std::int64_t>(shares_.size());
     for (std::int64_t i = 0; i < threads; ++i) {

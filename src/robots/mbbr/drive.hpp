@@ -20,6 +20,12 @@ struct MbbrDriveParams {
   double roller_slip_N_m = 0.0;         // micro-slip: torque ripple of a wheel as rollers pass
   double wheel_grip = 0.0;              // friction coefficient at the ball; 0: wheels never slip
   double gearbox_friction_share = 0.0;  // of the drive's friction that sits before the contact
+
+  /// Motors, wheels and gears are as drawn.
+  bool even() const noexcept {
+    return wheel_torque_scale == Vec3::Ones() && gear.play_rad == 0.0 && roller_tilt_rad == 0.0 &&
+           roller_slip_N_m == 0.0 && wheel_grip == 0.0;
+  }
 };
 
 /// Contact normals of the wheels, columns, body axes.

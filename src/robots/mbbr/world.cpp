@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kRollingStart_m_s = 0.005;  // below it rolling resistance fades
 
-enum At : int { kTheta = 0, kOmega = 3, kPhiDot = 6, kPhi = 8, kRelative = 10, kSlip = 13, kSpin = 15 };
+using namespace mbbr_at;  // NOLINT(google-build-using-namespace): the places in the state
 
 Vec<16> start_state(NoiseStream& noise, double sigma) {
   Vec<16> s = Vec<16>::Zero();
@@ -49,25 +49,10 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       process_noise_(world.common.seed, kProcessNoise),
       s_(start_state(start_noise_, world.common.initial_tilt_rad)),
       here_(s_),
-      sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)) {}
+      sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)),
+      plain_(world.common.plain() && world.drive.even() && !floor_.limited()) {}
 
-MbbrWorld::Instant::Instant(const State& s) noexcept
-    : motion(s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot)), heading(s(kTheta + 2)) {
-  turn(s);
-}
-
-MbbrWorld::Instant::Instant(const Instant& before, const State& s, double by_rad) noexcept
-    : motion(before.motion, s.segment<2>(kTheta), s.segment<3>(kOmega), s.segment<2>(kPhiDot)),
-      heading(before.heading.near(s(kTheta + 2), by_rad)) {
-  turn(s);
-}
-
-void MbbrWorld::Instant::turn(const State& s) noexcept {
-  motion.spin_rad_s = s(kSpin);
-  relative_B = MbbrDynamics::encoder_rate_B(motion);
-}
-
-MbbrWorld::Instant MbbrWorld::near(const State& s) const noexcept {
+MbbrWorld::Here MbbrWorld::near(const State& s) const noexcept {
   return {here_, s, s(kTheta + 2) - s_(kTheta + 2)};
 }
 
@@ -77,8 +62,8 @@ void MbbrWorld::arrive(const State& s) noexcept {
 }
 
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept {
-  Vec3 limit = Vec3::Constant(mu_c * world.coulomb_scale);
-  limit.z() *= relative_rate_B.z() >= 0.0 ? world.yaw_friction_scale.x() : world.yaw_friction_scale.y();
+  Vec3 limit = sliding_friction_N_m<double>(mu_c * world.coulomb_scale, world.yaw_friction_scale.x(),
+                                            world.yaw_friction_scale.y(), relative_rate_B);
   for (int i = 0; i < 3; ++i) limit(i) *= world.common.stiction.factor(relative_rate_B(i));
   return limit;
 }
@@ -96,11 +81,12 @@ Vec2 MbbrWorld::pull_star(const Instant& now) const noexcept {
   return pull;
 }
 
+double MbbrWorld::viscous_N_m_s() const noexcept {
+  return world_.common.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
+}
+
 void MbbrWorld::forces(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept {
-  const double viscous = world_.common.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
-  now->viscous_B = -viscous * now->relative_B;
-  now->wheel_torque = drive_.wheel_torques(motors_, now->relative_B);
-  now->loads.tau_B = drive_.torque_B(now->wheel_torque, now->viscous_B + friction_B);
+  now->drive(wheels(), viscous_N_m_s(), friction_B);
   if (!push_W.isZero(0.0)) {
     now->loads.push_B = now->motion.R().topRows<2>().transpose() * now->heading.back(push_W);
   }
@@ -109,35 +95,10 @@ void MbbrWorld::forces(Instant* now, const Vec2& push_W, const Vec3& friction_B)
 
 void MbbrWorld::rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept {
   forces(now, push_W, friction_B);
-  now->mass = dynamics_.mass(now->motion);
-  now->a = dynamics_.accelerations(now->motion, now->mass, now->loads);
+  now->roll(dynamics_);
 }
 
-/// The same instant with friction: forces and mass matrix are known, the accelerations linear in the torque.
-MbbrWorld::Instant MbbrWorld::with_friction(const Instant& free, const Vec3& friction_B) const noexcept {
-  Instant now = free;
-  now.loads.tau_B = drive_.torque_B(free.wheel_torque, free.viscous_B + friction_B);
-  const MbbrAccelerations more =
-      dynamics_.response(free.motion, free.mass, now.loads.tau_B - free.loads.tau_B);
-  now.a.omega_dot_B += more.omega_dot_B;
-  now.a.phi_ddot_inertial += more.phi_ddot_inertial;
-  return now;
-}
-
-MbbrWorld::State MbbrWorld::derivative(const Instant& now) const noexcept {
-  const MbbrMotion& m = now.motion;
-  State d;
-  const Vec3 theta_dot = m.theta_dot();
-  d.segment<3>(kTheta) = theta_dot;
-  d.segment<3>(kOmega) = now.a.omega_dot_B;
-  d.segment<2>(kPhiDot) = MbbrDynamics::phi_star_ddot(m, now.a, theta_dot.z());
-  d.segment<2>(kPhi) = now.heading(m.phi_dot_star);
-  d.segment<3>(kRelative) = drive_.seen_rate_B(now.relative_B);
-  d.segment<3>(kSlip).setZero();
-  return d;
-}
-
-MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const Instant& now,
+MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const Here& now,
                                             const MbbrSlipAccelerations& a) const noexcept {
   const MbbrMotion& m = now.motion;
   const Vec3 theta_dot = m.theta_dot();
@@ -165,12 +126,7 @@ Vec3 MbbrWorld::friction_limit_B(const Instant& now) const noexcept {
 Vec3 MbbrWorld::coulomb_torque_B(const Instant& free) const noexcept {
   if (!world_.common.friction) return Vec3::Zero();
   const double h = world_.common.step_s;
-  const MbbrMotion& m = free.motion;
-  const Vec3 theta_dot = m.theta_dot();
-  const MbbrMotion next(m, m.theta_xy() + h * theta_dot.head<2>(), m.omega_B + h * free.a.omega_dot_B,
-                        m.phi_dot_star + h * MbbrDynamics::phi_star_ddot(m, free.a, theta_dot.z()));
-  return uncoupled_coulomb_torque<3>(MbbrDynamics::encoder_rate_B(next), mobility_, h,
-                                     friction_limit_B(free));
+  return uncoupled_coulomb_torque<double, 3>(free.relative_after(h), mobility_, h, friction_limit_B(free));
 }
 
 /// The same where the floor may give way: all axes, the slip and the spin together.
@@ -222,26 +178,27 @@ void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const Mb
 void MbbrWorld::step(double h) noexcept {
   drive_.begin_step(motors_, here_.relative_B, kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
   const Vec2 push = push_now();
-  Instant free = here_;
+  Instant free(here_);
   rolling(&free, push, Vec3::Zero());
   if (!slipping_) {
     friction_.axes_B = coulomb_torque_B(free);
-    const Instant now = with_friction(free, friction_.axes_B);
+    const Instant now = free.with_friction(dynamics_, wheels(), friction_.axes_B);
     slipping_ = floor_.limited() && !floor_.carries(floor_.needed(now.motion, now.loads, now.a));
     if (!slipping_) {
       if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
       load_wheels(now, friction_.axes_B, now.a, h);
-      arrive(rk4_step(s_, derivative(now), h, [&](const State& s) {
-        Instant then = near(s);
+      arrive(rk4_step(s_, now.derivative(wheels()), h, [&](const State& s) {
+        Instant then(near(s));
         rolling(&then, push, friction_.axes_B);
-        return derivative(then);
+        return then.derivative(wheels());
       }));
       time_s_ += h;
       return;
     }
   }
   friction_ = slip_friction(s_, free, h);
-  const auto sliding = [&](Instant now) {
+  const auto sliding = [&](const Here& here) {
+    Instant now(here);
     forces(&now, push, friction_.axes_B);
     return floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
   };
@@ -250,7 +207,7 @@ void MbbrWorld::step(double h) noexcept {
   if (sensors_.aged()) sensors_.feel(felt(free.motion, felt_a));
   load_wheels(free, friction_.axes_B, felt_a, h);
   State next = rk4_step(s_, slip_derivative(s_, free, a), h, [&](const State& s) {
-    const Instant now = near(s);
+    const Here now = near(s);
     return slip_derivative(s, now, sliding(now));
   });
   if (friction_.floor_holds) {
@@ -264,7 +221,7 @@ void MbbrWorld::step(double h) noexcept {
 void MbbrWorld::advance(const MotorCommand& command) {
   if (command.enable) held_ = false;
   const double h = world_.common.step_s;
-  const int steps = static_cast<int>(std::lround(kTickS / h));
+  const int steps = steps_per_tick();
   const double taken_at = world_.common.actuation_steps();
   for (int i = 0; i < steps && !held_; ++i) {
     const double part = taken_at - i;
@@ -279,24 +236,56 @@ void MbbrWorld::advance(const MotorCommand& command) {
   }
   if (held_) {
     time_s_ += kTickS;
+    motors_.update_battery(kinematics_.wheels_from_ball(here_.relative_B));
   } else {
-    disturb();
-    here_ = Instant(s_);  // anew once a tick: what a step adds is exact but for the last digit
+    end_tick();
   }
+}
+
+void MbbrWorld::end_tick() noexcept {
+  disturb();
+  here_ = Here(s_);  // anew once a tick: what a step adds is exact but for the last digit
   motors_.update_battery(kinematics_.wheels_from_ball(here_.relative_B));
+}
+
+int MbbrWorld::steps_per_tick() const noexcept {
+  return static_cast<int>(std::lround(kTickS / world_.common.step_s));
+}
+
+bool MbbrWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexcept {
+  if (!plain_ || !command.enable || slipping_) return false;
+  held_ = false;
+  motors_.command(command);
+  Eigen::Map<State>(robot->state) = s_;
+  robot->bodies = bodies(robot_);
+  Eigen::Map<Vec3>(robot->mobility) = mobility_;
+  robot->viscous_N_m_s = viscous_N_m_s();
+  robot->coulomb_N_m = world_.common.friction ? robot_.mu_c * world_.coulomb_scale : 0.0;
+  robot->yaw_positive = world_.yaw_friction_scale.x();
+  robot->yaw_negative = world_.yaw_friction_scale.y();
+  robot->ratio = robot_.r / robot_.r_w;
+  Eigen::Map<Mat3>(robot->T_ob) = kinematics_.T_ob();
+  robot->bridges = *motors_.bridges();
+  return true;
+}
+
+void MbbrWorld::end_rolling(const Rolling& robot) noexcept {
+  s_ = Eigen::Map<const State>(robot.state);
+  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += world_.common.step_s;
+  end_tick();
 }
 
 Felt MbbrWorld::felt_now() const noexcept {
   if (slipping_) {
-    Instant now = here_;
+    Instant now(here_);
     forces(&now, push_now(), friction_.axes_B);
     const MbbrSlipAccelerations a =
         floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
     return felt(now.motion, felt_as_rolling(a, robot_.r));
   }
-  Instant now = here_;
+  Instant now(here_);
   rolling(&now, push_now(), Vec3::Zero());
-  if (!held_) now = with_friction(now, coulomb_torque_B(now));
+  if (!held_) now = now.with_friction(dynamics_, wheels(), coulomb_torque_B(now));
   return felt(now.motion, now.a);
 }
 

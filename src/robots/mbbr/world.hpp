@@ -6,7 +6,7 @@
 
 #include "equipoise/plant/sensors.hpp"
 #include "robots/mbbr/drive.hpp"
-#include "robots/mbbr/dynamics.hpp"
+#include "robots/mbbr/rolling.hpp"
 #include "robots/mbbr/slipping.hpp"
 
 namespace equipoise {
@@ -30,11 +30,21 @@ Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& r
 
 class MbbrWorld {
  public:
+  using Rolling = MbbrRollingOf<double>;
+
   MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor, const Calibration& calibration,
             const MbbrWorldParams& world);
 
   /// Advances one tick with the bridges as commanded.
   void advance(const MotorCommand& command);
+
+  /// The same tick in two halves, where nothing is on that MbbrRollingOf leaves out: what the steps depend
+  /// on, if so; and their end. Between them roll() or roll_together().
+  bool begin_rolling(const MotorCommand& command, Rolling* robot) noexcept;
+  void end_rolling(const Rolling& robot) noexcept;
+  BridgeType bridge() const noexcept { return motors_.type(); }
+  int steps_per_tick() const noexcept;
+  double step_s() const noexcept { return world_.common.step_s; }
 
   /// What the devices report now.
   RawSample sense();
@@ -47,33 +57,27 @@ class MbbrWorld {
   bool slipping() const noexcept { return slipping_; }  // the ball on the floor
 
  private:
-  /// Attitude, body rates, ball rates (yaw frame), ball angles (inertial, of its centre's path), relative
-  /// ball angle, slip of the floor contact (yaw frame, m/s), spin; 3 + 3 + 2 + 2 + 3 + 2 + 1.
-  using State = Vec<16>;
-  /// The forces of one instant and what they do.
-  struct Instant {
-    explicit Instant(const State& s) noexcept;                               // motion alone
-    Instant(const Instant& before, const State& s, double by_rad) noexcept;  // within a step from there
+  using State = MbbrStateOf<double>;
+  using Here = MbbrHereOf<double>;
+  using Instant = MbbrInstantOf<double>;
+  /// The drive with its motors.
+  struct Wheels {
+    const MbbrDrive& drive;
+    const MbbrDrive::Motors& motors;
 
-    MbbrMotion motion;
-    Turn heading;
-    Vec3 relative_B;  // rate of the ball against the body
-    Vec3 wheel_torque;
-    Vec3 viscous_B;
-    MbbrLoads loads;
-    MbbrMass mass;
-    MbbrAccelerations a;
-
-   private:
-    void turn(const State& s) noexcept;
+    Vec3 wheel_torques(const Vec3& rate_B) const noexcept { return drive.wheel_torques(motors, rate_B); }
+    Vec3 torque_B(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept {
+      return drive.torque_B(wheel_torque, friction_B);
+    }
+    Vec3 seen_rate_B(const Vec3& rate_B) const noexcept { return drive.seen_rate_B(rate_B); }
   };
-  Instant near(const State& s) const noexcept;  // within a step from here
+  Wheels wheels() const noexcept { return {drive_, motors_}; }
+  double viscous_N_m_s() const noexcept;
+  Here near(const State& s) const noexcept;  // within a step from here
   /// Of an instant whose motion is known: forces, and accelerations of a ball that rolls.
   void forces(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
   void rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
-  Instant with_friction(const Instant& free, const Vec3& friction_B) const noexcept;
-  State derivative(const Instant& now) const noexcept;
-  State slip_derivative(const State& s, const Instant& now, const MbbrSlipAccelerations& a) const noexcept;
+  State slip_derivative(const State& s, const Here& now, const MbbrSlipAccelerations& a) const noexcept;
   Vec3 friction_limit_B(const Instant& now) const noexcept;
   Vec3 coulomb_torque_B(const Instant& free) const noexcept;
   MbbrFriction slip_friction(const State& s, const Instant& free, double h) const noexcept;
@@ -84,6 +88,7 @@ class MbbrWorld {
   void step(double h) noexcept;
   void load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a, double h) noexcept;
   void disturb();
+  void end_tick() noexcept;
   void arrive(const State& s) noexcept;
 
   MbbrParameters robot_;
@@ -96,8 +101,9 @@ class MbbrWorld {
   MbbrSlipping floor_;
   NoiseStream start_noise_, process_noise_;
   State s_;
-  Instant here_;  // motion at s_
+  Here here_;  // at s_
   SimulatedSensors sensors_;
+  bool plain_;  // as MbbrRollingOf has it
   double time_s_ = 0.0;
   bool held_ = true;
   bool slipping_ = false;

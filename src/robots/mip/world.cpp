@@ -2,25 +2,31 @@
 
 #include <algorithm>
 
-#include "equipoise/plant/coulomb.hpp"
-#include "equipoise/plant/integrator.hpp"
-
 namespace equipoise {
 namespace {
 
 constexpr double kRollingStart_m_s = 0.005;  // below it rolling resistance fades
 
-enum At : int { kTheta, kPhi, kPsi, kThetaDot, kPhiDot, kPsiDot, kPosition };
+using namespace mip_at;  // NOLINT(google-build-using-namespace): the places in the state
 
 // A hand that lifts the robot tips it slowly, our estimate.
 constexpr double kHandRate_rad_s = 0.1;
 constexpr double kHeldTilt_rad = 0.3;
 
-Vec<8> start_state(NoiseStream& noise, double sigma) {
-  Vec<8> s = Vec<8>::Zero();
-  s(kTheta) = noise.gaussian(sigma);
-  s(kPsi) = noise.gaussian(sigma);
-  return s;
+MipRollingOf<double> start(const MipParameters& robot, const MipWorldParams& world, NoiseStream& noise) {
+  MipRollingOf<double> now{};
+  now.state[kTheta] = noise.gaussian(world.common.initial_tilt_rad);
+  now.state[kPsi] = noise.gaussian(world.common.initial_tilt_rad);
+  now.bodies = bodies(robot);
+  now.yaw_to_wheel = robot.yaw_to_wheel();
+  now.viscous_N_m_s = world.common.friction ? robot.mu_v : 0.0;
+  for (int i = 0; i < 2; ++i) {
+    now.coulomb_N_m[i] = world.common.friction ? robot.mu_c * world.drivetrain.friction_gain(i) : 0.0;
+    now.motor_gain[i] = world.drivetrain.motor_gain(i);
+    now.engaged[i] = 1.0;
+  }
+  now.gear = world.drivetrain.gear;
+  return now;
 }
 
 }  // namespace
@@ -48,35 +54,14 @@ MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, con
       motors_(motor, calibration, world.common),
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
-      s_(start_state(start_noise_, world.common.initial_tilt_rad)),
-      sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s_(kTheta), 0.0, s_(kPsi))) {
+      now_(start(robot_, world, start_noise_)),
+      sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s()(kTheta), 0.0, s()(kPsi))),
+      plain_(world.common.plain() && world.lift_at_s < 0.0) {
   for (int i = 0; i < 2; ++i) {  // upright at rest
     const Vec2 unit = Vec2::Unit(i);
     const Vec3 a = dynamics_.accelerations(MipMotion{}, unit.sum(), unit.x() - unit.y());
-    mobility_.col(i) = kinematics_.wheels(a(1), a(2));
+    Eigen::Map<Mat<2, 2>>(now_.mobility).col(i) = kinematics_.wheels(a(1), a(2));
   }
-}
-
-MipMotion MipWorld::motion(const State& s) noexcept {
-  return {s(kTheta), s(kThetaDot), s(kPhiDot), s(kPsiDot)};
-}
-
-MipWorld::Facing::Facing(const State& s) noexcept : tilt(s(kTheta)), heading(s(kPsi)) {}
-
-MipWorld::Facing::Facing(const Facing& before, const State& s, const State& from) noexcept
-    : tilt(before.tilt.near(s(kTheta), s(kTheta) - from(kTheta))),
-      heading(before.heading.near(s(kPsi), s(kPsi) - from(kPsi))) {}
-
-Vec2 MipWorld::wheel_rates(const State& s) const noexcept {
-  return kinematics_.wheels(s(kPhiDot), s(kPsiDot));
-}
-
-/// Motor and viscous friction, as far as the teeth touch.
-Vec2 MipWorld::gear_torque(const State& s) const noexcept {
-  const Vec2 rate = wheel_rates(s);
-  Vec2 tau = motors_.torque(rate).cwiseProduct(world_.drivetrain.motor_gain);
-  if (world_.common.friction) tau -= robot_.mu_v * rate;
-  return tau.cwiseProduct(engaged_);
 }
 
 Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept {
@@ -84,8 +69,7 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
     const Vec2 wheel = wheel_torque / robot_.I_w1;
     return {0.0, kinematics_.phi(wheel), 0.0};
   }
-  Vec3 a = dynamics_.accelerations(motion(s), facing.tilt, wheel_torque.sum(),
-                                   wheel_torque.x() - wheel_torque.y());
+  Vec3 a = MipLevelOf<double>{dynamics_}.accelerations(s, facing, wheel_torque);
   const Vec2 push_W = push_force_W(world_.common, time_s_);
   const Vec2& slope = world_.common.floor_slope_rad;
   const double resistance = world_.common.rolling_resistance;
@@ -112,83 +96,54 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
   return a;
 }
 
-MipWorld::State MipWorld::derivative(const State& s, const Facing& facing,
-                                     const Vec3& accelerations) const noexcept {
-  State d;
-  d.segment<3>(kTheta) = s.segment<3>(kThetaDot);
-  d.segment<3>(kThetaDot) = accelerations;
-  const double speed = lifted() ? 0.0 : -robot_.r * (s(kPhiDot) + s(kThetaDot));
-  d.segment<2>(kPosition) = facing.heading(Vec2(0.0, speed));
-  return d;
-}
-
-Vec2 MipWorld::friction_torque(const State& s, const Facing& facing, const Vec2& gear_torque) const noexcept {
-  if (!world_.common.friction) return Vec2::Zero();
-  const double h = world_.common.step_s;
-  const State next = s + h * derivative(s, facing, accelerations(s, facing, gear_torque));
-  const Vec2 now = wheel_rates(s);
+Vec2 MipWorld::friction_limit(const Vec2& wheel_rates) const noexcept {
   const Stiction& stiction = world_.common.stiction;
-  Vec2 limit = robot_.mu_c * world_.drivetrain.friction_gain;
-  limit = limit.cwiseProduct(Vec2(stiction.factor(now.x()), stiction.factor(now.y())));
-  return coulomb_torque<2>(wheel_rates(next), mobility_, h, limit);
-}
-
-/// The motor's side of each gear over one step.
-void MipWorld::cross_backlash(double step_s) noexcept {
-  const GearPlayParams& gear = world_.drivetrain.gear;
-  if (gear.play_rad == 0.0) return;
-  const Vec2 rate(gears_[0].rate_rad_s(), gears_[1].rate_rad_s());
-  const Vec2 motor = motors_.torque(wheel_rates(s_) + rate);
-  for (int i = 0; i < 2; ++i) {
-    const bool touch = gears_[static_cast<std::size_t>(i)].step(gear, motor(i), step_s);
-    engaged_(i) = touch ? 1.0 : 0.0;
-  }
+  return {now_.coulomb_N_m[0] * stiction.factor(wheel_rates.x()),
+          now_.coulomb_N_m[1] * stiction.factor(wheel_rates.y())};
 }
 
 void MipWorld::disturb() {
   if (world_.process_noise_sigma.isZero(0.0)) return;
-  for (int i = 0; i < 6; ++i) s_(i) += process_noise_.gaussian(world_.process_noise_sigma(i));
+  for (int i = 0; i < 6; ++i) now_.state[i] += process_noise_.gaussian(world_.process_noise_sigma(i));
 }
 
 Felt MipWorld::felt(const Vec3& accelerations) const noexcept {
-  const double sin = std::sin(s_(kTheta));
-  const double cos = std::cos(s_(kTheta));
+  const double sin = std::sin(s()(kTheta));
+  const double cos = std::cos(s()(kTheta));
   Felt felt;
   felt.time_s = time_s_;
-  felt.omega_B_rad_s << s_(kThetaDot), sin * s_(kPsiDot), cos * s_(kPsiDot);
+  felt.omega_B_rad_s << s()(kThetaDot), sin * s()(kPsiDot), cos * s()(kPsiDot);
   if (held_ || lifted()) {
     felt.specific_force_B_m_s2 << 0.0, sin * kGravity_m_s2, cos * kGravity_m_s2;
   } else {
     const Vec3 from_com = robot_.l_a - Vec3(0.0, 0.0, robot_.l);
-    felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(motion(s_), accelerations, from_com);
+    felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(
+        {s()(kTheta), s()(kThetaDot), s()(kPhiDot), s()(kPsiDot)}, accelerations, from_com);
   }
   felt.wheel_angle_rad.head<2>() =
-      kinematics_.wheels(s_(kPhi), s_(kPsi)) + Vec2(gears_[0].ahead_rad(), gears_[1].ahead_rad());
+      kinematics_.wheels(s()(kPhi), s()(kPsi)) + Vec2(now_.gears[0].ahead_rad(), now_.gears[1].ahead_rad());
   return felt;
 }
 
 void MipWorld::step(double h) noexcept {
   if (lifted()) {
-    s_(kThetaDot) = s_(kTheta) < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
-    s_(kPsiDot) = 0.0;
+    now_.state[kThetaDot] = now_.state[kTheta] < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
+    now_.state[kPsiDot] = 0.0;
   }
-  cross_backlash(h);
-  const Vec2 gear = gear_torque(s_);
-  const Facing facing(s_);
-  const Vec2 friction = friction_torque(s_, facing, gear);
-  const Vec3 now = accelerations(s_, facing, gear + friction);
-  if (sensors_.aged()) sensors_.feel(felt(now));
-  s_ = rk4_step(s_, derivative(s_, facing, now), h, [&](const State& s) {
-    const Facing turned(facing, s, s_);
-    return derivative(s, turned, accelerations(s, turned, gear_torque(s) + friction));
-  });
+  equipoise::step(
+      &now_, Body{*this}, Facing(s()), world_.common.step_s, h,
+      [this](const Vec2& rates) { return motors_.torque(rates); },
+      [this](const Vec2& rates) { return friction_limit(rates); },
+      [this](const Vec3& accelerations) {
+        if (sensors_.aged()) sensors_.feel(felt(accelerations));
+      });
   time_s_ += h;
 }
 
 void MipWorld::advance(const MotorCommand& command) {
   if (command.enable) held_ = false;
   const double h = world_.common.step_s;
-  const int steps = static_cast<int>(std::lround(kTickS / h));
+  const int steps = steps_per_tick();
   const double taken_at = world_.common.actuation_steps();
   for (int i = 0; i < steps && !held_; ++i) {
     const double part = taken_at - i;
@@ -201,21 +156,45 @@ void MipWorld::advance(const MotorCommand& command) {
       step(h);
     }
   }
-  if (held_) {
-    time_s_ += kTickS;
-  } else {
-    disturb();
-  }
-  motors_.update_battery(wheel_rates(s_));
+  if (held_) time_s_ += kTickS;
+  end_tick();
+}
+
+void MipWorld::end_tick() noexcept {
+  if (!held_) disturb();
+  motors_.update_battery(now_.wheel_rates(s()));
+}
+
+int MipWorld::steps_per_tick() const noexcept {
+  return static_cast<int>(std::lround(kTickS / world_.common.step_s));
+}
+
+bool MipWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexcept {
+  if (!plain_ || !command.enable) return false;
+  held_ = false;
+  motors_.command(command);
+  *robot = now_;
+  robot->bridges = *motors_.bridges();
+  return true;
+}
+
+void MipWorld::end_rolling(const Rolling& robot) noexcept {
+  now_ = robot;
+  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += world_.common.step_s;
+  end_tick();
 }
 
 RawSample MipWorld::sense() {
-  const Vec2 gear = gear_torque(s_);
-  const Facing facing(s_);
-  const Felt here = felt(accelerations(s_, facing, gear + friction_torque(s_, facing, gear)));
+  const State at = s();
+  const Vec2 rates = now_.wheel_rates(at);
+  const Vec2 gear = now_.gear_torque(rates, motors_.torque(rates));
+  const Facing facing(at);
+  const Vec2 friction = friction_torque<double>(now_, Body{*this}, at, facing, gear, friction_limit(rates),
+                                                world_.common.step_s);
+  const Felt here = felt(accelerations(at, facing, gear + friction));
   TrueMotion m;
   m.time_s = time_s_;
-  m.theta_rad << s_(kTheta), 0.0, s_(kPsi);
+  m.theta_rad << s()(kTheta), 0.0, s()(kPsi);
   m.omega_B_rad_s = here.omega_B_rad_s;
   m.specific_force_B_m_s2 = here.specific_force_B_m_s2;
   m.wheel_angle_rad = {here.wheel_angle_rad(0), here.wheel_angle_rad(1)};
@@ -225,13 +204,13 @@ RawSample MipWorld::sense() {
 
 MipEstimate MipWorld::truth() const noexcept {
   MipEstimate x;
-  x.theta = s_(kTheta);
-  x.phi = s_(kPhi);
-  x.psi = s_(kPsi);
-  x.theta_dot = s_(kThetaDot);
-  x.phi_dot = s_(kPhiDot);
-  x.psi_dot = s_(kPsiDot);
-  x.position_W_m = s_.segment<2>(kPosition);
+  x.theta = s()(kTheta);
+  x.phi = s()(kPhi);
+  x.psi = s()(kPsi);
+  x.theta_dot = s()(kThetaDot);
+  x.phi_dot = s()(kPhiDot);
+  x.psi_dot = s()(kPsiDot);
+  x.position_W_m = s().segment<2>(kPosition);
   return x;
 }
 

@@ -7,10 +7,8 @@
 
 #include <array>
 
-#include "equipoise/plant/gear_play.hpp"
-#include "equipoise/plant/motors.hpp"
 #include "equipoise/plant/sensors.hpp"
-#include "robots/mip/dynamics.hpp"
+#include "robots/mip/rolling.hpp"
 
 namespace equipoise {
 
@@ -33,11 +31,21 @@ MipParameters as_built(MipParameters nominal, const ActualScales& actual) noexce
 
 class MipWorld {
  public:
+  using Rolling = MipRollingOf<double>;
+
   MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
            const MipWorldParams& world);
 
   /// Advances one tick with the bridges as commanded.
   void advance(const MotorCommand& command);
+
+  /// The same tick in two halves, where nothing is on that MipRollingOf leaves out: what the steps depend on,
+  /// if so; and their end. Between them roll() or roll_together().
+  bool begin_rolling(const MotorCommand& command, Rolling* robot) noexcept;
+  void end_rolling(const Rolling& robot) noexcept;
+  BridgeType bridge() const noexcept { return motors_.type(); }
+  int steps_per_tick() const noexcept;
+  double step_s() const noexcept { return world_.common.step_s; }
 
   /// What the devices report now.
   RawSample sense();
@@ -49,40 +57,39 @@ class MipWorld {
   double battery_V() const noexcept { return motors_.battery_V(); }
 
  private:
-  /// theta, phi, psi, their rates, position in W.
-  using State = Vec<8>;
-  static MipMotion motion(const State& s) noexcept;
-  Vec2 wheel_rates(const State& s) const noexcept;
-  Vec2 gear_torque(const State& s) const noexcept;
-  /// Sines and cosines of a state, computed once per evaluation.
-  struct Facing {
-    explicit Facing(const State& s) noexcept;
-    Facing(const Facing& before, const State& s, const State& from) noexcept;  // within a step from there
+  using State = MipStateOf<double>;
+  using Facing = MipFacingOf<double>;
+  /// With what pushes and pulls the robot, or lifts it.
+  struct Body {
+    const MipWorld& world;
 
-    Turn tilt, heading;
+    Vec3 accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept {
+      return world.accelerations(s, facing, wheel_torque);
+    }
+    double speed(const State& s) const noexcept {
+      return world.lifted() ? 0.0 : -world.robot_.r * (s(mip_at::kPhiDot) + s(mip_at::kThetaDot));
+    }
   };
+  Eigen::Map<const State> s() const noexcept { return Eigen::Map<const State>(now_.state); }
   Vec3 accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept;
-  State derivative(const State& s, const Facing& facing, const Vec3& accelerations) const noexcept;
-  Vec2 friction_torque(const State& s, const Facing& facing, const Vec2& gear_torque) const noexcept;
+  Vec2 friction_limit(const Vec2& wheel_rates) const noexcept;
   Felt felt(const Vec3& accelerations) const noexcept;
   void step(double h) noexcept;
-  void cross_backlash(double step_s) noexcept;
   void disturb();
+  void end_tick() noexcept;
   bool lifted() const noexcept { return world_.lift_at_s >= 0.0 && time_s_ >= world_.lift_at_s; }
 
   MipParameters robot_;
   MipWorldParams world_;
   MipKinematics kinematics_;
   MipDynamics dynamics_;
-  Mat<2, 2> mobility_;  // of the wheels' encoder rates
   SimulatedMotors<Mip::kWheels> motors_;
   NoiseStream start_noise_, process_noise_;
-  State s_;
+  MipRollingOf<double> now_;
   SimulatedSensors sensors_;
+  bool plain_;  // as MipRollingOf has it
   double time_s_ = 0.0;
   bool held_ = true;
-  std::array<GearPlay, Mip::kWheels> gears_;
-  Vec2 engaged_ = Vec2::Ones();  // 1: teeth in contact
 };
 
 }  // namespace equipoise
