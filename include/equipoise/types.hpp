@@ -33,12 +33,7 @@ class TurnOf {
  public:
   using V = VecOf<Real, 2>;
 
-  explicit TurnOf(const Real& angle_rad) noexcept {
-    using std::cos;
-    using std::sin;
-    c_ = cos(angle_rad);
-    s_ = sin(angle_rad);
-  }
+  explicit TurnOf(const Real& angle_rad) noexcept : c_(cosine_of(angle_rad)), s_(sine_of(angle_rad)) {}
   V operator()(const V& v) const noexcept { return {c_ * v.x() - s_ * v.y(), s_ * v.x() + c_ * v.y()}; }
   V back(const V& v) const noexcept { return {c_ * v.x() + s_ * v.y(), c_ * v.y() - s_ * v.x()}; }
   /// Of what turns within a tick: to 1e-10 up to 0.2 rad, by series.
@@ -65,6 +60,15 @@ class TurnOf {
 
  private:
   TurnOf(const Real& c, const Real& s) noexcept : c_(c), s_(s) {}
+
+  static Real cosine_of(const Real& angle_rad) noexcept {
+    using std::cos;
+    return cos(angle_rad);
+  }
+  static Real sine_of(const Real& angle_rad) noexcept {
+    using std::sin;
+    return sin(angle_rad);
+  }
 
   Real c_, s_;
 };

@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "equipoise/real.hpp"
+#include "equipoise/types.hpp"
 
 namespace equipoise {
 
