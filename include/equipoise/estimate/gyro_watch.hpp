@@ -70,6 +70,7 @@ class GyroWatch {
       return;
     }
     z.gyro_B_rad_s -= jump_.bias_rad_s();
+    said_rad_s_ = z.gyro_B_rad_s;
     noise_.hear(z.gyro_B_rad_s);
     if (noise_.too_much()) trusted_ = false;
     const Vec3 step = z.gyro_B_rad_s - expected_rad_s;
@@ -77,11 +78,11 @@ class GyroWatch {
     const bool jolt = z.accel_B_m_s2.squaredNorm() > kMaxAccel_m_s2 * kMaxAccel_m_s2;
     const bool whole = z.gyro_axis_ok[0] && z.gyro_axis_ok[1] && z.gyro_axis_ok[2];
     if (odd || jolt || !whole || suspected_) leave_out(z, step, expected_rad_s, odd, jolt);
-    const Vec3 jump = step - step_before_;
-    step_before_ = step;
+    const Vec3 step_before = std::exchange(step_before_, step);
+    const Vec3 jump = step - step_before;
     const double turning = kShakes_s * z.gyro_B_rad_s.z();
     if (jump_.examining() || jump.cwiseProduct(p_.per_jump).squaredNorm() > 1.0 + turning * turning)
-      examine(z, expected_rad_s, jump, u_before);
+      examine(z, expected_rad_s, jump, step_before, u_before);
   }
 
   /// What the gyro says, without axes that are left out, against all wheels, also one that is blamed already:
@@ -93,6 +94,7 @@ class GyroWatch {
     bool returns = false;  // an axis: what stood in for it is no sample
     for (std::size_t i = 0; i < 3; ++i) returns = returns || (z.gyro_axis_ok[i] && !examined_[i]);
     examined_ = z.gyro_axis_ok;
+    const Vec3 said_rad_s = evidence_ > 0.0 && left_out_ ? heard_out(z) : z.gyro_B_rad_s;
     if (!z.imu_ok || !z.encoders_ok || z.ticks > 1 || returns) {
       history_.forget();
       evidence_ = 0.0;
@@ -102,7 +104,7 @@ class GyroWatch {
       return;
     }
     settling_ = std::max(settling_ - 1, 0);
-    history_.add(z.gyro_B_rad_s, z.wheel_angle_rad);
+    history_.add(said_rad_s, z.wheel_angle_rad);
     const bool calm = accel_nis_ < kPushed && settling_ == 0;
     const bool examined = history_.samples() >= History::span(kHalf) && calm;
     const Verdict verdict = examined ? judge(witness) : Verdict{};
@@ -187,6 +189,17 @@ class GyroWatch {
     return rate;
   }
 
+  /// A gyro that seems to lie is heard to the end: an axis that got impossible meanwhile is the best witness.
+  Vec3 heard_out(const Sample& z) noexcept {
+    Vec3 rate = z.gyro_B_rad_s;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (away_[i] == 0) continue;
+      rate(static_cast<int>(i)) = said_rad_s_(static_cast<int>(i));
+      examined_[i] = true;
+    }
+    return rate;
+  }
+
   bool mirrors(const Vec3& gyro_rad_s, const Vec3& expected_rad_s) noexcept {
     const double as_is = (gyro_rad_s - expected_rad_s).norm();
     if (!(as_is > kOdd_rad_s)) return false;
@@ -259,8 +272,9 @@ class GyroWatch {
     suspected_ = left_out_;  // what counts ticks in a row is back at zero
   }
 
-  /// Has it jumped? Not where a lie or a torque explains it, nor where the gyro is suspected already.
-  void examine(Sample& z, const Vec3& expected_rad_s, const Vec3& jump_rad_s,
+  /// Has it jumped? Not where a lie or a torque explains it, nor where the gyro was further off before or is
+  /// suspected already.
+  void examine(Sample& z, const Vec3& expected_rad_s, const Vec3& jump_rad_s, const Vec3& step_before_rad_s,
                const Vec<Wheels>& u_before) noexcept {
     const Vec3& before_rad_s = history_.gyro_rad_s();
     const auto explained = [&] {
@@ -268,7 +282,7 @@ class GyroWatch {
       const auto by = [&](const Vec<Wheels>& du) {
         return jump_rad_s.dot(p_.by_torque * du) > kExplainsAJump * size * size;
       };
-      return size < kOfNoise * noise_.rad_s() || by(u_ - u_before_) || by(u_before_ - u_before) ||
+      return size < kOfNoise * noise_.rad_s() || size < step_before_rad_s.norm() || by(u_ - u_before_) || by(u_before_ - u_before) ||
              left_with_a_lie(z.gyro_B_rad_s, before_rad_s) < kExplainsAJump * size;
     };
     if (!z.imu_ok || left_out_ || history_.samples() < kBeforeAJump || evidence_ > 0.0 || contradicted_ > 0 ||
@@ -385,6 +399,7 @@ class GyroWatch {
   double accel_nis_ = 0.0;
   GyroNoise noise_;
   BiasJump jump_;
+  Vec3 said_rad_s_ = Vec3::Zero();   // before axes were left out
   Vec3 step_before_ = Vec3::Zero();  // where the gyro was from what was expected, a tick ago
   Vec<Wheels> carried_rad_s2_ = Vec<Wheels>::Zero();
   bool trusted_ = true;

@@ -13,6 +13,7 @@
 #include "app/cli/reasons.hpp"
 #include "app/evaluate/fault_run.hpp"
 #include "app/evaluate/parallel.hpp"
+#include "app/run/firmware.hpp"
 #include "config/population.hpp"
 
 namespace equipoise::app {
@@ -23,6 +24,7 @@ struct CampaignArguments {
   std::string json;
   std::string markdown;
   std::string fidelity = "nominal";
+  std::string controller;  // empty: the robot's default
   std::vector<std::string> set;
   std::vector<std::string> faults;  // empty: all
   std::vector<std::string> phases;
@@ -51,10 +53,10 @@ struct Case {
 };
 
 template <class Firmware>
-FaultOutcome one(const typename Firmware::Config& config, const std::string& fidelity, const FaultPlan& plan,
+FaultOutcome one(const typename Firmware::Config& config, const Choice& choice, const FaultPlan& plan,
                  std::uint64_t seed) {
-  auto world = Firmware::world(config, fidelity_level(fidelity), seed);
-  return Firmware::with_pipeline(config, Firmware::kDefaultController, [&](auto& pipeline) {
+  auto world = Firmware::world(config, fidelity_level(choice.fidelity), seed);
+  return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
     const auto unrecorded = [](const auto&...) {};
     return run_with_fault(world, pipeline, plan, seed, unrecorded);
   });
@@ -73,8 +75,7 @@ int fault_tick(Phase phase) {
 
 /// Runs with a random fault each, of random kind, time and length; between faults nothing may happen.
 template <class Firmware>
-Soak soak(const typename Firmware::Config& config, const std::string& fidelity, double hours,
-          std::uint64_t seed) {
+Soak soak(const typename Firmware::Config& config, const Choice& choice, double hours, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   const auto pick = [&engine](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(engine);
@@ -90,7 +91,7 @@ Soak soak(const typename Firmware::Config& config, const std::string& fidelity, 
     plan.fault_ticks = pick(1, 200);
     plan.end_tick = plan.fault_at_tick + pick(200, 2000);
     const std::uint64_t run_seed = engine();
-    const FaultOutcome v = one<Firmware>(config, fidelity, plan, run_seed);
+    const FaultOutcome v = one<Firmware>(config, choice, plan, run_seed);
     ticks += plan.end_tick;
     ++s.runs;
     s.disarmed += v.disarmed ? 1 : 0;
@@ -111,13 +112,9 @@ Soak soak(const typename Firmware::Config& config, const std::string& fidelity, 
   return s;
 }
 
-/// The robot as it was drawn, with its default estimator and controller.
+/// The robot as it was drawn.
 template <class Firmware>
-typename Firmware::Config configured(const CampaignArguments& a, std::int64_t robot) {
-  Choice choice;
-  choice.estimator = Firmware::kDefaultEstimator;
-  choice.controller = Firmware::kDefaultController;
-  choice.fidelity = a.fidelity;
+typename Firmware::Config configured(const CampaignArguments& a, const Choice& choice, std::int64_t robot) {
   const auto drawn = config::draw_robot(a.config, a.set, a.fidelity, robot);
   return Firmware::apply(Firmware::load(a.config, config::with_robot_drawn(drawn, a.fidelity, a.set)).config,
                          choice);
@@ -194,17 +191,20 @@ std::string cell_of(const std::vector<FaultOutcome>& outcomes) {
 
 template <class Firmware>
 int campaign(const CampaignArguments& a) {
+  Choice choice;
+  choice.controller = a.controller;
+  choice.fidelity = a.fidelity;
+  complete<Firmware>(choice);
   // To configure a robot takes as long as a second of its run: on all threads, too.
   std::vector<std::optional<typename Firmware::Config>> configs(static_cast<std::size_t>(a.robots));
   Workers(threads_for(a.jobs)).each(a.robots, [&](int r) {
-    configs[static_cast<std::size_t>(r)] = configured<Firmware>(a, a.robot + r);
+    configs[static_cast<std::size_t>(r)] = configured<Firmware>(a, choice, a.robot + r);
   });
   const std::vector<Case> all = cases_of(a);
   const auto outcomes =
       in_parallel<FaultOutcome>("campaign", all.size(), threads_for(a.jobs), [&](std::size_t i) {
         const Case& c = all[i];
-        return one<Firmware>(*configs[static_cast<std::size_t>(c.robot - a.robot)], a.fidelity, c.plan,
-                             c.seed);
+        return one<Firmware>(*configs[static_cast<std::size_t>(c.robot - a.robot)], choice, c.plan, c.seed);
       });
 
   nlohmann::json cases = nlohmann::json::array();
@@ -238,7 +238,7 @@ int campaign(const CampaignArguments& a) {
       std::to_string(cases.size()) + " fault x phase cases, " + std::to_string(unsafe) + " unsafe";
   std::string soak_runs;
   if (a.soak_h > 0.0) {
-    const Soak s = soak<Firmware>(*configs[0], a.fidelity, a.soak_h, a.seed);
+    const Soak s = soak<Firmware>(*configs[0], choice, a.soak_h, a.seed);
     out["soak"] = {{"hours", s.hours},
                    {"runs", s.runs},
                    {"disarmed", s.disarmed},
@@ -276,6 +276,8 @@ void add_campaign(Subcommand app) {
   command.option("--seeds", a->seeds, "runs per case").show_default().range(1, 1000);
   command.option("--seed", a->seed, "the first").show_default();
   command.option("--fidelity", a->fidelity, "of the world").show_default();
+  command.option("--controller", a->controller,
+                 "which controller balances (default: the robot's): " + known_controllers());
   command.option("--robot", a->robot, "of the population, the first; 0: the typical one").show_default();
   command.option("--robots", a->robots, "of the population").show_default().range(1, 100000);
   std::vector<std::string> faults;

@@ -50,22 +50,22 @@ struct MipGains {
 /// pole; q, its fastest pole, the motors' back-EMF; U, the u that holds a radian of lean; a, the wheel's
 /// acceleration under a held lean of one radian.
 struct MipSlcDesign {
-  double gain_U = 17.316;
-  double integral_p = 1.1829;
-  double lead_q = 0.98408;
-  double roll_off_rad_s = 300.0;
-  double outer_gain_pp_a = 0.084328;  // of p^2/a
-  double outer_zero_p = 0.26286;
-  double outer_pole_p = 0.78858;
-  double outer_roll_off_rad_s = 200.0;
+  double gain_U = 31.1;
+  double integral_p = 1.78;
+  double lead_q = 1.083;
+  double roll_off_rad_s = 217.0;
+  double outer_gain_pp_a = 0.01504;  // of p^2/a
+  double outer_zero_p = 0.1477;
+  double outer_pole_p = 3.32;
+  double outer_roll_off_rad_s = 76.8;
 };
 
 /// Bryson's rule: a weight is 1 / (deviation worth one unit of u)^2.
 struct MipLqrDesign {
-  double theta_rad = 0.2;
-  double phi_rad = 2.0;
-  double theta_dot_rad_s = 20.0;
-  double phi_dot_rad_s = 200.0;
+  double theta_rad = 0.05;
+  double phi_rad = 5.0;
+  double theta_dot_rad_s = 8.0;
+  double phi_dot_rad_s = 60.0;
   double u_x = 1.0;
 };
 

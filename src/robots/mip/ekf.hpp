@@ -110,6 +110,8 @@ class MipEkf {
   TimeBase<2, 2> time_;
   Vec2 gyro_bias_yz_ = Vec2::Zero();
   double heading_ = 0.0;
+  int settling_ = 0;   // ticks left until a push is told
+  int without_y_ = 0;  // ticks left in which the gyro's y is not heard
 };
 
 }  // namespace equipoise
