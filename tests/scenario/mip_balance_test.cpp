@@ -79,6 +79,26 @@ TEST(Mip, RecoversFromAPush) {
   }
 }
 
+/// Robots as built: without a doubt about the rates the filter lags behind a push, and all of these fell at 2 N.
+TEST(Mip, RobotsAsBuiltTakeAPush) {
+  const std::atomic<bool> never{false};
+  for (const char* controller : {"slc", "lqr"}) {
+    for (const char* force_N : {"1.0", "-2.0"}) {
+      for (std::int64_t robot = 2601; robot <= 2612; ++robot) {
+        std::vector<std::string> set{"world.full.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, " +
+                                     std::string(force_N) + "]}]"};
+        const auto drawn = config::draw_robot(kMip, set, "full", robot);
+        set = config::with_robot_drawn(drawn, "full", set);
+        const app::SimOptions options{{true, 0.0, 0.0}, 9.0, 1};
+        const app::SimSummary s = app::simulate<app::MipFirmware>(
+            load_mip(kMip, set).config, {"ekf", controller, "full", false, "dmp"}, options, nullptr, never);
+        EXPECT_FALSE(s.verdict.fell())
+            << controller << ", " << force_N << " N, robot " << robot << ", reasons " << s.verdict.reasons;
+      }
+    }
+  }
+}
+
 TEST(MipConfig, RefusesAnotherRobotsFileAndNamesTheLine) {
   const std::string mbbr = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
   try {

@@ -14,7 +14,7 @@ namespace equipoise {
 struct MipReferenceParams {
   double max_acceleration_m_s2 = 0.5;  // of the speed command
   double max_jerk_m_s3 = std::numeric_limits<double>::infinity();
-  double max_yaw_acceleration_rad_s2 = 10.0;
+  double max_yaw_acceleration_rad_s2 = 5.0;
   double max_phi_error_rad = 6.0;  // a robot that is held back does not store up a leap
   double wheel_radius_m = 0.035;
   double feasible_acceleration_m_s2 = std::numeric_limits<double>::infinity();  // of this robot
