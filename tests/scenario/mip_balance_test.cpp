@@ -79,7 +79,8 @@ TEST(Mip, RecoversFromAPush) {
   }
 }
 
-/// Robots as built: without a doubt about the rates the filter lags behind a push, and all of these fell at 2 N.
+/// Robots as built: without a doubt about the rates the filter lags behind a push, and all of these fell at 2
+/// N.
 TEST(Mip, RobotsAsBuiltTakeAPush) {
   const std::atomic<bool> never{false};
   for (const char* controller : {"slc", "lqr"}) {

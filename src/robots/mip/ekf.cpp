@@ -5,10 +5,10 @@
 namespace equipoise {
 namespace {
 
-// A push is what the accelerometer feels and no torque explains (30: 0.5 N at the centre of mass): the rates are
-// in doubt by so much a tick. By the mean of all rows instead, what a lying gyro says would pass for a push (25 of
-// 3840 runs unsafe); at 15, or with ten times the variance, lqr keeps itself shaking. Chosen on robots 1 to 80
-// (lies) and 101 to 150 (1 to 4 N for 50 ms, and without).
+// A push is what the accelerometer feels and no torque explains (30: 0.5 N at the centre of mass): the rates
+// are in doubt by so much a tick. By the mean of all rows instead, what a lying gyro says would pass for a
+// push (25 of 3840 runs unsafe); at 15, or with ten times the variance, lqr keeps itself shaking. Chosen on
+// robots 1 to 80 (lies) and 101 to 150 (1 to 4 N for 50 ms, and without).
 constexpr double kPushNis = 30.0;
 constexpr double kPushTiltRateVariance = 0.005;
 constexpr double kPushWheelRateVariance = 0.1;
@@ -201,7 +201,9 @@ void MipEkf::update(const Mip::Sample& z) noexcept {
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
   without_y_ = filter_.row_nis()[Model::kGyro + 1] > kOddNis ? kWithoutTicks : std::max(without_y_ - 1, 0);
-  filter_.update(time_.acted(), y, {imu && axis[0], imu && axis[1] && without_y_ == 0, imu && axis[2], wheel[0], wheel[1], imu});
+  filter_.update(
+      time_.acted(), y,
+      {imu && axis[0], imu && axis[1] && without_y_ == 0, imu && axis[2], wheel[0], wheel[1], imu});
 }
 
 Vec2 MipEkf::wheel_rate_rad_s() const noexcept {
