@@ -19,6 +19,15 @@ app::SimSummary run(const std::string& controller, double yaw_rate_rad_s, std::u
   return app::simulate<app::MipFirmware>(load_mip(kMip, set).config, choice, options, nullptr, never);
 }
 
+/// A robot of the population, in world `full` with what is set there.
+app::SimSummary run_drawn(std::int64_t robot, const std::string& controller, const app::SimOptions& options,
+                          const std::vector<std::string>& set = {}) {
+  static const std::atomic<bool> never{false};
+  const auto drawn = config::draw_robot(kMip, set, "full", robot);
+  return app::simulate<app::MipFirmware>(load_mip(kMip, config::with_robot_drawn(drawn, "full", set)).config,
+                                         {"ekf", controller, "full", false, "dmp"}, options, nullptr, never);
+}
+
 using Case = std::tuple<const char*, const char*, double>;  // controller, bridge, yaw rate
 class MipBalance : public testing::TestWithParam<Case> {};
 
@@ -41,13 +50,9 @@ INSTANTIATE_TEST_SUITE_P(Cases, MipBalance,
 /// At 1 Hz and 0.2 m/s the inner wheel hardly turns: it sticks, turns within its play, and its encoder is
 /// sound. With the configured radii in place of the learnt ones each of these robots lost it, and one fell.
 TEST(Mip, AWheelThatATurnLeavesStillIsNotLeftOut) {
-  const std::atomic<bool> never{false};
   const app::SimOptions options{{true, 0.2, 2.0 * kPi}, 20.0, 1};
   for (const std::int64_t robot : {6152, 6169, 6191, 6199, 6201, 6205, 6207, 6209, 6290}) {
-    const auto drawn = config::draw_robot(kMip, {}, "full", robot);
-    const auto set = config::with_robot_drawn(drawn, "full", {});
-    const app::SimSummary s = app::simulate<app::MipFirmware>(
-        load_mip(kMip, set).config, {"ekf", "slc", "full", false, "dmp"}, options, nullptr, never);
+    const app::SimSummary s = run_drawn(robot, "slc", options);
     EXPECT_FALSE(s.verdict.fell()) << "robot " << robot;
     EXPECT_EQ(s.degraded & (kWithoutWheelOne | kWithoutWheelTwo), 0u) << "robot " << robot;
   }
@@ -79,20 +84,15 @@ TEST(Mip, RecoversFromAPush) {
   }
 }
 
-/// Robots as built: without a doubt about the rates the filter lags behind a push, and all of these fell at 2
-/// N.
+/// Without a doubt about the rates the filter lags behind a push: all of these fell at 2 N.
 TEST(Mip, RobotsAsBuiltTakeAPush) {
-  const std::atomic<bool> never{false};
-  for (const char* controller : {"slc", "lqr"}) {
-    for (const char* force_N : {"1.0", "-2.0"}) {
+  const app::SimOptions options{{true, 0.0, 0.0}, 9.0, 1};
+  for (const std::string force_N : {"1.0", "-2.0"}) {
+    const std::vector<std::string> push{"world.full.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, " +
+                                        force_N + "]}]"};
+    for (const char* controller : {"slc", "lqr"}) {
       for (std::int64_t robot = 2601; robot <= 2612; ++robot) {
-        std::vector<std::string> set{"world.full.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, " +
-                                     std::string(force_N) + "]}]"};
-        const auto drawn = config::draw_robot(kMip, set, "full", robot);
-        set = config::with_robot_drawn(drawn, "full", set);
-        const app::SimOptions options{{true, 0.0, 0.0}, 9.0, 1};
-        const app::SimSummary s = app::simulate<app::MipFirmware>(
-            load_mip(kMip, set).config, {"ekf", controller, "full", false, "dmp"}, options, nullptr, never);
+        const app::SimSummary s = run_drawn(robot, controller, options, push);
         EXPECT_FALSE(s.verdict.fell())
             << controller << ", " << force_N << " N, robot " << robot << ", reasons " << s.verdict.reasons;
       }
