@@ -156,3 +156,13 @@ def test_wrong_usage_of_the_run_command_leaves_nothing(run_command, arguments):
     assert result.returncode == 2
     assert made == []
     assert arguments[0] in result.stderr or arguments[-1] in result.stderr
+
+
+@pytest.mark.parametrize("turn", [("--yaw-rad-s", "5", "--compare"), ("--path", "circle")])
+def test_the_default_yaw_rate_gives_way_to_what_excludes_it(run_command, turn):
+    """README's second picture was refused: its own yaw rate met the default one."""
+    result, made = run_command(
+        "--config", "config/edumip.toml", "--drive-mps", "0.2", "--duration-s", "5", *turn
+    )
+    assert result.returncode == 0, result.stderr
+    assert (made[0] / "report.png").exists()
