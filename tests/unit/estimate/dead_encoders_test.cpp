@@ -44,7 +44,10 @@ TEST(DeadEncoders, OneAloneIsNotItsBusiness) {
 
 TEST(DeadEncoders, TheThirdWheelDoesNotTurnAlone) {
   EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}), 22);    // 0.13 rad of yaw that is not there
-  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}, 0), 0);  // one of the two is known to be dead
+  // One of the two is known to be dead: the other may stand still for a second.
+  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}, 0), 222);
+  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 1.7)}, 0), 237);  // 2 rad
+  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 1.0)}, 0, 390), 0);
 }
 
 TEST(DeadEncoders, InATurnWhoseDriveCancelsItAtTwoWheelsTheThirdTurnsAlone) {
