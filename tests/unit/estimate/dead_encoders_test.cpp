@@ -43,7 +43,7 @@ TEST(DeadEncoders, OneAloneIsNotItsBusiness) {
 }
 
 TEST(DeadEncoders, TheThirdWheelDoesNotTurnAlone) {
-  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}), 22);    // 0.13 rad of yaw that is not there
+  EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}), 22);  // 0.13 rad of yaw that is not there
   // One of the two is known to be dead: the other may stand still for a second.
   EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 5.1)}, 0), 222);
   EXPECT_EQ(found({Vec3::Zero(), Vec3(0.0, 0.0, 1.7)}, 0), 237);  // 2 rad
