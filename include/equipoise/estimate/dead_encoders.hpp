@@ -71,8 +71,8 @@ class DeadEncoders {
   static constexpr double kYawsForOne_rad = 2.2;
   static constexpr double kOthers_rad = 1.0;
   static constexpr int kPassing = 40;  // ticks: drive and turn do not cancel for longer
-  // A wheel whose axis points where the robot goes may stand still while the only other one rolls. In twelve
-  // directions at 0.1 m/s, one encoder dead: two of 1440 sound ones stood still for 200 ticks.
+  // Beside a dead encoder a sound wheel whose axis points where the robot goes may stand still while the
+  // third rolls on: in twelve directions at 0.1 m/s for 160 ticks in 4 of 720 runs, for 200 in none of 1440.
   static constexpr double kGone_rad = 2.0;
   static constexpr int kHeld = 220;  // ticks
 
@@ -80,7 +80,7 @@ class DeadEncoders {
     std::array<double, 3> turned_rad{};  // body, since both stand still
     double wheels_yaw_rad = 0.0;         // what the other wheels say of its yaw
     double others_rad = 0.0;             // their way
-    double gone_rad = 0.0;               // how far from where they were
+    double gone_rad = 0.0;               // how far they went, one way
     int ticks = 0;
   };
 
