@@ -348,7 +348,7 @@ class GyroWatch {
     double wheel = kLargest * kLargest;
     for (int i = 0; i < Wheels; ++i) wheel = std::min(wheel, with_another_wheel(left, p_.sigma_rad_s, i));
     verdict.surprise = as_is;
-    verdict.lies = other < kExplains * as_is && other < wheel;
+    verdict.lies = other < kExplains * as_is && other < p_.of_an_encoder * wheel;
     const bool rightly = witness.wheel_stands || wheel < kExplains * kSurprise;
     if (witness.blamed_wheel >= 0 && rightly) verdict.lies = false;
     verdict.unexplained = std::min(as_is, wheel);

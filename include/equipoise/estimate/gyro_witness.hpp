@@ -17,6 +17,7 @@ struct GyroWatchParams {
   Vec3 max_step_rad_s = Vec3::Constant(2.0);  // of a rate against what was expected; at least 1
   Mat<3, Wheels> by_torque = Mat<3, Wheels>::Zero();  // what u does to the body's rates in a tick
   Vec3 per_jump = Vec3::Zero();  // 1 over the least jump of the bias that is examined; zero: of no interest
+  double of_an_encoder = 1.0;    // a lie leaves less than so much of what is left with another encoder
   std::array<bool, 3> balances{true, true, true};  // axes without which the robot falls
   // Axes whose rate is known without a torque: `rate_from_wheels` times the wheels' rates and what the filter
   // adds.

@@ -24,6 +24,7 @@ GyroWatchParams<2> gyro_watch(const MipEstimatorParams& params) {
   p.max_step_rad_s =
       Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
   p.per_jump = {6.5, 0.0, 0.0};                                     // 0.15 rad/s; more than sound robots show
+  p.of_an_encoder = 0.2;  // one that counts backwards in a turn looks much like axes z and x swapped
   p.balances = {true, false, false};
   p.by_rate = {false, true, true};  // y sees the yaw of a leaning robot, tyres do not slip
   p.rate_sigma_rad_s = {0.0, 0.06, 0.25};
@@ -197,7 +198,7 @@ EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
   if (params_.active != Id::kEkf) return h;
   report(isolation_, &h);
   h.dead = dead_encoders_.dead();
-  h.bias_drift_rad_s = bias_drift_.distance();
+  h.bias_drift_rad_s = isolation_.suspects() ? 0.0 : bias_drift_.distance();
   h.disturbance = ekf_.x().segment<2>(MipEkfModel::kDisturbance).norm();
   h.gyro_left_out = gyro_watch_.left_out();
   h.gyro_bias_jumped = gyro_watch_.bias_jumped();
