@@ -1,5 +1,6 @@
 """What the reliability page makes of a campaign's cases."""
 
+from equipoise_tools.reliability import traced
 from equipoise_tools.reliability_population import POPULATION_FAULTS, found
 
 
@@ -16,3 +17,17 @@ def test_found_tells_median_last_and_what_was_not_found():
 def test_every_fault_of_the_population_is_known(root):
     known = (root / "src" / "app" / "io" / "fault_backend.hpp").read_text()
     assert [name for name in POPULATION_FAULTS if f'{{"{name}",' not in known] == []
+
+
+def test_a_traced_tick_counts_when_its_test_passed(root):
+    name = "InATickOnlyTheDriversCallTheKernelAndNothingSleeps"
+    assert any(name in file.read_text() for file in (root / "tests" / "hardware").rglob("*.cpp"))
+    console = "trace: 400 ticks, at most 12 system calls in one, 0 sleeps\n[       OK ] {} (4243 ms)\n"
+    for case in (f"ClosedLoop.{name}", f"Robot/ClosedLoop.{name}/Mbbr"):
+        assert traced(console.format(case))[2:] == (
+            "400 ticks of the emulated robot: at most 12, drivers' only; 0 blocked",
+            True,
+        )
+        assert not traced(console.format(case).replace("0 sleeps", "1 sleeps"))[3]
+        assert not traced(console.format(case).replace("      OK", "  FAILED"))[3]
+    assert not traced("")[3]

@@ -90,22 +90,26 @@ def tick(_: argparse.Namespace) -> Part:
     return part
 
 
-def trace(_: argparse.Namespace) -> Part:
-    output(ROOT / "tools/vm-test", "robot", check=False)
-    console = (ROOT / "build/vm/console-bookworm.log").read_text(errors="replace")
+def traced(console: str) -> tuple[str, str, str, bool]:
+    """The row of what the emulated robot's kernel traced, from its console."""
     found = re.search(r"^trace: (\d+) ticks, at most (\d+) system calls in one, (\d+) sleeps", console, re.M)
     ticks, most, sleeps = map(int, found.groups()) if found else (0, 0, 0)
-    passed = "[       OK ] ClosedLoop.InATickOnlyTheDrivers" in console
-    return Part(
-        [
-            (
-                "system calls of a whole tick, kernel's trace",
-                "the drivers' only, 0 that block",
-                f"{ticks} ticks of the emulated robot: at most {most}, drivers' only; {sleeps} blocked",
-                passed and ticks > 0 and sleeps == 0,
-            )
-        ]
+    passed = re.search(r"^\[ +OK \] (\S+/)?ClosedLoop\.InATickOnlyTheDrivers", console, re.M) is not None
+    return (
+        "system calls of a whole tick, kernel's trace",
+        "the drivers' only, 0 that block",
+        (
+            f"{ticks} ticks of the emulated robot: at most {most}, drivers' only; {sleeps} blocked"
+            if passed
+            else "not measured: the test failed"
+        ),
+        passed and ticks > 0 and sleeps == 0,
     )
+
+
+def trace(_: argparse.Namespace) -> Part:
+    output(ROOT / "tools/vm-test", "robot", check=False)
+    return Part([traced((ROOT / "build/vm/console-bookworm.log").read_text(errors="replace"))])
 
 
 def sandbox(_: argparse.Namespace) -> Part:
