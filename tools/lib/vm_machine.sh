@@ -32,7 +32,7 @@ package_of() {
 # prepare_source [SUITE]: of a release's kernel source, in $vm/source-SUITE, what modules and the boards' device trees are
 # made of. Debian moved the trees to ti/omap in between.
 prepare_source() {
-  local suite=${1:-bookworm} source package archive parts stamp
+  local suite=${1:-bookworm} machine source package archive parts stamp
   source=$vm/source-$suite
   stamp=$source.stamp
   parts=('drivers/gpio/*.[ch]' 'kernel/irq/irq_sim.c' 'drivers/counter/*.[ch]'
@@ -40,10 +40,11 @@ prepare_source() {
     'drivers/net/can/sja1000/*.h' 'arch/arm/boot/dts/*am33*' 'arch/arm/boot/dts/*tps65217*' 'include/dt-bindings/*'
     'include/uapi/linux/input-event-codes.h')
   [ "$(cat "$stamp" 2>/dev/null)" != "${parts[*]}" ] || return 0
-  package=$(package_of "$suite" armhf linux-source)
+  machine=$(dpkg --print-architecture) # the source is the same package everywhere
+  package=$(package_of "$suite" "$machine" linux-source)
   rm -rf "$source" "$source.deb"
   mkdir -p "$source.deb" "$source"
-  (cd "$source.deb" && foreign_apt armhf "$suite" download "$package" >&2) || die "could not download $package of $suite"
+  (cd "$source.deb" && foreign_apt "$machine" "$suite" download "$package" >&2) || die "could not download $package of $suite"
   unpack "$source.deb" "$source.deb/$package"_*.deb
   archive=$source.deb/usr/src/$package.tar.xz
   tar -xJf "$archive" -C "$source" --strip-components=1 --wildcards "${parts[@]/#/*/}"
