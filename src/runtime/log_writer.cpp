@@ -92,7 +92,7 @@ void LogWriter::preamble(std::int64_t utime, std::string_view channel,
   preamble_utime_ = utime;
   preamble_channel_ = channel;
   preamble_ = data;
-  std::memcpy(event(utime, channel, data.size()), data.data(), data.size());
+  std::copy(data.begin(), data.end(), event(utime, channel, data.size()));
   write_out();
 }
 
