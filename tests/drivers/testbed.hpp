@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <umockdev.h>
 
+#include <atomic>
 #include <map>
 #include <string>
 
@@ -35,7 +36,7 @@ class Testbed : public ::testing::Test {
   std::string writeFile(const std::string& name, const std::string& content);  // path for open()
 
   FakeImu imu;
-  bool plain_i2c = true;  // what I2C_FUNCS promises
+  std::atomic<bool> plain_i2c = true;  // what I2C_FUNCS promises; umockdev reads it in a thread of its own
 
  private:
   static gboolean onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
