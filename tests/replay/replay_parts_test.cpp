@@ -103,6 +103,7 @@ TEST(Compare, KeepsTheFirstTicksDifference) {
   logged.tick = 2;
   app::compare(logged, replayed, &d);
   EXPECT_EQ(d.tick, 1);
+  EXPECT_EQ(d.field, "EQUIPOISE_MOTORS.duty[0]");
 }
 
 TEST(Judged, ByTheTruthAndItsClockWhereThereIsOne) {
