@@ -5,6 +5,7 @@
 
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/actuate/degraded.hpp"
+#include "equipoise/actuate/encoder_probe.hpp"
 #include "equipoise/actuate/safety_inputs.hpp"
 #include "equipoise/control/friction.hpp"
 #include "equipoise/estimate/health.hpp"
@@ -55,6 +56,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         reference_(p.reference),
         feedback_(p.feedback),
         encoder_check_(estimators_.isolates() ? 0.0 : p.safety.encoder_check_drive),
+        encoder_probe_(p.safety.encoder_probe_drive),
         bridge_(p.motor),
         safety_(p.safety) {}
 
@@ -68,7 +70,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     t.ref = follow(limited(safety_.timely(asked), t.degraded), t.x_hat);  // [T] 6.2.1
     t.u_lin = feedback_.update(t.ref);                                    // [T] (6.10)
     t.u_lin += encoder_stimulus(t.z);  // shakes each wheel right after arming
-    const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);
+    const Input friction = friction_of(t.z, t.u_lin);
     t.u_friction = t.u_lin + friction;            // [T] 6.2.2
     const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
     t.motors = safety_.gate(duty, checks(t, asked, loop.inhibit));
@@ -128,6 +130,14 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         encoder_check_.update(safety_.armed(), duty_previous_, z.wheel_angle_rad));
   }
 
+  /// What friction takes from the drive: of wheels that turn, and of wheels that may be held by it.
+  Input friction_of(const typename Robot::Sample& z, const Input& u) noexcept {
+    constexpr int kTurn = Robot::kInputs - 1;  // about the vertical, of every robot
+    Input friction = kinematics_.friction_input(p_.friction, z.wheel_rate_rad_s);
+    friction(kTurn) += encoder_probe_.update(safety_.armed(), z, u(kTurn));
+    return friction;
+  }
+
   Wheels within_supply(const Input& u, double limit) const noexcept {
     if constexpr (Feedback::kSharesDuty) {
       return kinematics_.allocate(u, limit);  // balance before yaw before travel
@@ -180,6 +190,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     if (health_.while_arming)
       (health_.stood_still ? in.encoders_stuck : in.encoders_reversed) |= health_.lost;
     in.encoders_stuck |= health_.dead;
+    if (encoder_probe_.dead()) in.encoders_stuck |= (1U << Robot::kWheels) - 1U;
     in.encoders_in_check = in.encoders_in_check || health_.checking;
     in.bias_drift_rad_s = health_.bias_drift_rad_s;
     in.disturbance = health_.disturbance;
@@ -224,6 +235,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Reference reference_;
   Feedback feedback_;
   EncoderCheck<Robot::kWheels> encoder_check_;
+  EncoderProbe<Robot::kWheels> encoder_probe_;
   Bridge bridge_;
   Safety safety_;
   EstimatorHealth<Robot::kWheels> health_;

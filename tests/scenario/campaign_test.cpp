@@ -121,4 +121,22 @@ TEST(NotFooled, BySensorsThatLie) {
   }
 }
 
+/// Standing still they say no less than sound encoders do, until the robot is turned a little.
+TEST(TwoDeadEncoders, EndWithinHalfASecondOnARobotWithTwoWheels) {
+  for (const char* controller : {"slc", "lqr"}) {
+    const nlohmann::json dead = result("edumip", std::string("--fidelity full --fault two_encoders_dead "
+                                                             "--robot 9621 --robots 10 --controller ") +
+                                                     controller);
+    int off = 0;
+    for (const nlohmann::json& each : dead["cases"]) {
+      EXPECT_FALSE(each["unsafe"].get<bool>()) << each.dump();
+      if (each["phase"] == "disarmed" || each["phase"] == "arming") continue;
+      ASSERT_TRUE(each["disarmed"].get<bool>()) << each.dump();
+      EXPECT_LE(each["off_after_ticks"].get<int>(), 100) << each.dump();
+      ++off;
+    }
+    EXPECT_EQ(off, 40);
+  }
+}
+
 }  // namespace

@@ -52,6 +52,7 @@ struct SafetyParams {
   double max_innovation_published = 20.0;  // the same for [T]'s own filter, which trusts itself more
   double max_innovation_s = 0.05;          // above it for longer
   double encoder_check_drive = 0.3;   // shakes each wheel right after arming; 0: encoders are not checked
+  double encoder_probe_drive = 0.0;   // turns a robot whose encoders count nothing; 0: they are believed
   double max_tilt_sigma_rad = 0.1;    // the tilt is not known any more
   double max_bias_drift_rad_s = 0.1;  // of the gyro, against its mean over 20 s
   double max_disturbance = 2.0;       // of u, as the estimator has it: motors that do not do as told

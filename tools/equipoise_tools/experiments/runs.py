@@ -25,6 +25,7 @@ NO_GATES = {
     "safety.max_innovation_published": 1000,
     "safety.max_innovation": 1000,
     "safety.encoder_check_drive": 0,
+    "safety.encoder_probe_drive": 0,
 }
 # (6.13)'s sign, Euler-angle rates, filters in the yaw frame, no feed-forward of back-EMF.
 AS_PRINTED = {

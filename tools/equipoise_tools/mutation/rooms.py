@@ -83,6 +83,7 @@ ROOMS: dict[str, Room] = {
             "src/actuate/safety.cpp",
             "include/equipoise/actuate/degraded.hpp",
             "include/equipoise/actuate/encoder_check.hpp",
+            "include/equipoise/actuate/encoder_probe.hpp",
         ),
         (
             Stage(
@@ -91,6 +92,7 @@ ROOMS: dict[str, Room] = {
                     "unit/safety*_test.cpp",
                     "unit/actuate/degraded_test.cpp",
                     "unit/actuate/encoder_check_test.cpp",
+                    "unit/actuate/encoder_probe_test.cpp",
                 ),
             ),
             Stage("tests/scenario_tests", ("scenario/reasons_test.cpp",), only=("*safety.cpp",)),
