@@ -91,7 +91,8 @@ SafetyParams read_safety(Section s) {
   p.max_innovation_published = s.number("max_innovation_published", 1.0, 1000.0);
   p.max_innovation_s = s.number("max_innovation_s", 0.0, 10.0);
   p.encoder_check_drive = s.number("encoder_check_drive", 0.0, 0.6);
-  if (s.has("encoder_probe_drive")) p.encoder_probe_drive = s.number("encoder_probe_drive", 0.0, 0.6);  // logs before it: 0
+  if (s.has("encoder_probe_drive"))
+    p.encoder_probe_drive = s.number("encoder_probe_drive", 0.0, 0.6);  // logs before it: 0
   p.max_tilt_sigma_rad = s.number("max_tilt_sigma_rad", 0.01, 1.0);
   p.max_bias_drift_rad_s = s.number("max_bias_drift_rad_s", 0.001, 1.0);
   p.max_disturbance = s.number("max_disturbance", 0.01, 1000.0);

@@ -139,4 +139,22 @@ TEST(TwoDeadEncoders, EndWithinHalfASecondOnARobotWithTwoWheels) {
   }
 }
 
+TEST(TwoDeadEncoders, AreNotSeenInSoundOnesThatStandStill) {
+  const nlohmann::json sound = result("edumip",
+                                      "--fidelity full --fault torn_packet --phase balancing --robot 9641 "
+                                      "--robots 6 --after-s 20");
+  EXPECT_EQ(sound["case_count"].get<int>(), 6);
+  for (const nlohmann::json& each : sound["cases"]) {
+    EXPECT_TRUE(each["upright"].get<bool>()) << each.dump();
+    EXPECT_TRUE(each["degraded"].empty()) << each.dump();
+  }
+}
+
+TEST(TwoDeadEncoders, AreNotFoundBeforeTheRobotWasAsked) {
+  const nlohmann::json dead = result("edumip",
+                                     "--fidelity full --fault two_encoders_dead --phase balancing --robot "
+                                     "9650 --after-s 0.25");
+  EXPECT_TRUE(dead["cases"][0]["upright"].get<bool>()) << dead.dump();
+}
+
 }  // namespace

@@ -14,10 +14,11 @@ namespace equipoise {
 template <int Wheels>
 class EncoderProbe {
  public:
-  static constexpr int kPatience = 50;  // ticks without a count
-  static constexpr int kGrows = 30;     // ticks
-  static constexpr int kHolds = 10;     // ticks, at its largest
-  static constexpr int kTicks = kPatience + kGrows + kHolds;  // to the verdict, 0.45 s
+  // Ticks without a count, of a growing drive, and at its largest; to the verdict 0.45 s.
+  static constexpr int kPatience = 50;
+  static constexpr int kGrows = 30;
+  static constexpr int kHolds = 10;
+  static constexpr int kTicks = kPatience + kGrows + kHolds;
 
   /// `drive`: of full duty, at its largest; 0: no probe.
   explicit EncoderProbe(double drive) : drive_(drive) {}

@@ -31,6 +31,7 @@ struct CampaignArguments {
   int seeds = 1;
   int robots = 1;
   std::int64_t robot = 0;  // the first
+  double after_s = 0.0;    // 0: 5.5 s in all
   double soak_h = 0.0;
   std::uint64_t seed = 1;
   int jobs = 0;
@@ -135,6 +136,7 @@ std::vector<Case> cases_of(const CampaignArguments& a) {
           c.plan.phase = static_cast<Phase>(p);
           c.plan.fault = static_cast<FaultKind>(f);
           c.plan.fault_at_tick = fault_tick(c.plan.phase);
+          if (a.after_s > 0.0) c.plan.end_tick = c.plan.fault_at_tick + static_cast<int>(a.after_s * kTickHz);
           c.robot = a.robot + r;
           c.seed = a.seed + static_cast<std::uint64_t>(i);
           cases.push_back(c);
@@ -289,6 +291,9 @@ void add_campaign(Subcommand app) {
   command.option("--jobs", a->jobs, "threads; 0: one per core. The results do not depend on it")
       .show_default()
       .range(0, 1024);
+  command.option("--after-s", a->after_s, "how long a run goes on after its fault; 0: until 5.5 s")
+      .show_default()
+      .range(0.0, 3600.0);
   command.option("--soak-hours", a->soak_h, "then random runs, hours of robot time")
       .show_default()
       .range(0.0, 10000.0);

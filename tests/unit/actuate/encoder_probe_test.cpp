@@ -1,7 +1,7 @@
 // Encoders that count nothing: a drive grows until one counts, or they are dead.
-#include <gtest/gtest.h>
-
 #include "equipoise/actuate/encoder_probe.hpp"
+
+#include <gtest/gtest.h>
 
 namespace equipoise {
 namespace {
