@@ -48,6 +48,7 @@ class MbbrWorld {
 
   /// What the devices report now.
   RawSample sense();
+  void without_attitude() noexcept { sensors_.without_attitude(); }
 
   MbbrEstimate truth() const noexcept;
   const MbbrParameters& robot() const noexcept { return robot_; }  // as built
