@@ -32,6 +32,7 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
       attitude_kick_rad_(world.attitude_sigma_rad * std::sqrt(1.0 - attitude_keep_ * attitude_keep_)),
       heading_kick_rad_(world.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS)) {
   aged_ = world.aged();
+  encoder_noisy_ = world.encoder_sigma_rad != 0.0 || !world.quantise;  // else a zero's sign might differ
   misaligned_ = !world.imu_misalignment_rad.isZero(0.0);
   const double turn = world.imu_misalignment_rad.norm();
   R_misaligned_ = misaligned_ ? Eigen::AngleAxisd(turn, world.imu_misalignment_rad / turn).toRotationMatrix()
@@ -114,7 +115,8 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
     raw.accel_counts[k] = imu_counts(accel_S(i), calibration_.accel_m_s2_per_count);
   }
   for (std::size_t k = 0; k < wheels_; ++k) {
-    const double angle = m.wheel_angle_rad[k] + encoder_noise_.gaussian(world_.encoder_sigma_rad);
+    double angle = m.wheel_angle_rad[k];
+    if (encoder_noisy_) angle += encoder_noise_.gaussian(world_.encoder_sigma_rad);
     raw.encoder_counts[k] =
         counts(calibration_.encoder_sign[k] * angle, 2.0 * kPi / calibration_.encoder_counts_per_rev);
   }

@@ -63,6 +63,7 @@ class SimulatedSensors {
   Vec3 gyro_bias_, accel_bias_;
   bool misaligned_;
   bool aged_;
+  bool encoder_noisy_;
   DelayLine past_;
   Mat3 R_misaligned_;
   Eigen::Quaterniond q_mounted_;  // as the chip believes itself to be mounted
