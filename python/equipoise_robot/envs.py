@@ -58,9 +58,9 @@ class _Robots:
         weights = [1.0 / _SCALES[name] if name in _SCALES else 0.0 for name in self.names]
         self.episodes = _core.Episodes(self.request, count, jobs, weights, _ACTION_COST)
         self.population = population
-        self.observations = np.zeros((count, len(self.names)))
-        self.rewards = np.zeros(count)
-        self.lost = np.zeros(count, bool)
+        # Views of what the core writes; active: in the next step, by the core's will or by ours.
+        self.observations, self.rewards = self.episodes.observations, self.episodes.rewards
+        self.lost, self.active = self.episodes.lost, self.episodes.active
         # Bounded only by what safety lets pass: an observation outside has ended its episode.
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(self.names),), np.float64)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.episodes.wheels,), np.float64)
@@ -72,12 +72,11 @@ class _Robots:
             first, last = self.population
             numbers = [int(random.integers(first, last, endpoint=True)) for random in randoms]
         seeds = [int(random.integers(1 << 63)) for random in randoms]
-        self.episodes.reset(which, seeds, numbers, self.observations)
+        self.episodes.reset(which, seeds, numbers)
 
-    def step(self, actions: Array, active: NDArray[np.bool_]) -> None:
-        """Observations, rewards and who is lost, of those that are active."""
-        actions = np.ascontiguousarray(actions, np.float64)
-        self.episodes.step(actions, active, self.observations, self.rewards, self.lost)
+    def step(self, actions: Array) -> int:
+        """Observations, rewards and who is lost, of those that are active; how many of them are lost."""
+        return self.episodes.step(np.ascontiguousarray(actions, np.float64))
 
 
 class BalanceEnv(gymnasium.Env[Array, Array]):
@@ -106,7 +105,6 @@ class BalanceEnv(gymnasium.Env[Array, Array]):
         )
         self.observation_space = self._robots.observation_space
         self.action_space = self._robots.action_space
-        self._active = np.ones(1, bool)
 
     @property
     def observation_names(self) -> list[str]:
@@ -126,7 +124,7 @@ class BalanceEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         robots = self._robots
-        robots.step(np.reshape(action, (1, -1)), self._active)
+        robots.step(np.reshape(action, (1, -1)))
         return robots.observations[0].copy(), float(robots.rewards[0]), bool(robots.lost[0]), False, {}
 
 
@@ -161,8 +159,8 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
         self._limit = max_episode_steps
         self._now = 0
         self._ends = np.zeros(num_envs, np.int64)  # when each reaches the limit
-        self._active = np.ones(num_envs, bool)  # in the next step; the others are reset
-        self._again: list[int] = []
+        self._first_end = 0  # of them
+        self._again: list[int] = []  # reset by the next step, not active in it
         self._each = range(num_envs)
         self._random: list[np.random.Generator] = []
         self.single_observation_space = self._robots.observation_space
@@ -182,8 +180,7 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
             if one is not None or i >= len(self._random):
                 self._random[i : i + 1] = [np_random(one)[0]]
         self._robots.reset(list(self._each), self._random)
-        self._ends[:] = self._now + self._limit
-        self._active[:] = True
+        self._ends[:] = self._first_end = self._now + self._limit
         self._again = []
         return self._robots.observations.copy(), {}
 
@@ -191,14 +188,22 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
         self, actions: Array
     ) -> tuple[Array, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         robots = self._robots
-        robots.step(actions, self._active)
+        lost = robots.step(actions)
         self._now += 1
+        if lost == 0 and not self._again and self._now < self._first_end:  # as nearly always
+            truncated = np.zeros(self.num_envs, bool)
+        else:
+            truncated = self._ended()
+        return robots.observations.copy(), robots.rewards.copy(), robots.lost.copy(), truncated, {}
+
+    def _ended(self) -> NDArray[np.bool_]:
+        """Resets what had ended before this step, and notes what has ended with it; who reached the limit."""
+        robots = self._robots
         if self._again:
             robots.reset(self._again, [self._random[i] for i in self._again])
             self._ends[self._again] = self._now + self._limit
-            robots.lost[self._again], robots.rewards[self._again] = False, 0.0
         truncated = (self._ends <= self._now) & ~robots.lost
-        ended = robots.lost | truncated
-        self._again = ended.nonzero()[0].tolist()
-        self._active = ~ended
-        return robots.observations.copy(), robots.rewards.copy(), robots.lost.copy(), truncated, {}
+        self._again = (robots.lost | truncated).nonzero()[0].tolist()
+        robots.active[truncated] = False
+        self._first_end = int(self._ends.min())
+        return truncated

@@ -27,8 +27,12 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
       gyro_noise_(world.seed, kGyroNoise),
       accel_noise_(world.seed, kAccelNoise),
       encoder_noise_(world.seed, kEncoderNoise),
-      attitude_noise_(world.seed, kAttitudeNoise) {
+      attitude_noise_(world.seed, kAttitudeNoise),
+      attitude_keep_(std::exp(-kTickS / world.attitude_time_constant_s)),
+      attitude_kick_rad_(world.attitude_sigma_rad * std::sqrt(1.0 - attitude_keep_ * attitude_keep_)),
+      heading_kick_rad_(world.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS)) {
   aged_ = world.aged();
+  encoder_noisy_ = world.encoder_sigma_rad != 0.0 || !world.quantise;  // else a zero's sign might differ
   misaligned_ = !world.imu_misalignment_rad.isZero(0.0);
   const double turn = world.imu_misalignment_rad.norm();
   R_misaligned_ = misaligned_ ? Eigen::AngleAxisd(turn, world.imu_misalignment_rad / turn).toRotationMatrix()
@@ -39,15 +43,20 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
   attitude_history_.fill(theta_rad);
 }
 
-void SimulatedSensors::attitude_packet(const Vec3& theta_rad) {
-  const double tau = world_.attitude_time_constant_s;
-  const double keep = std::exp(-kTickS / tau);
-  const double kick = world_.attitude_sigma_rad * std::sqrt(1.0 - keep * keep);
-  attitude_error_.head<2>() = keep * attitude_error_.head<2>() + attitude_noise_.gaussian_vector<2>(kick);
-  attitude_error_.z() +=
-      attitude_noise_.gaussian(world_.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS));
+void SimulatedSensors::attitude_packet(const Vec3& theta_rad, RawSample* raw) {
+  attitude_error_.head<2>() =
+      attitude_keep_ * attitude_error_.head<2>() + attitude_noise_.gaussian_vector<2>(attitude_kick_rad_);
+  attitude_error_.z() += attitude_noise_.gaussian(heading_kick_rad_);
   attitude_head_ = (attitude_head_ + 1) % kAttitudeDelay;
   attitude_history_[attitude_head_] = theta_rad + attitude_error_;
+  const auto delay = static_cast<std::size_t>(world_.attitude_latency_ticks);
+  const Vec3 attitude = attitude_history_[(attitude_head_ + kAttitudeDelay - delay) % kAttitudeDelay];
+  const auto [w, x, y, z] = quaternion_of(attitude);
+  const Eigen::Quaterniond q = Eigen::Quaterniond(w, x, y, z) * q_mounted_;
+  raw->attitude_wxyz[0] = q.w();
+  raw->attitude_wxyz[1] = q.x();
+  raw->attitude_wxyz[2] = q.y();
+  raw->attitude_wxyz[3] = q.z();
 }
 
 RawSample SimulatedSensors::sense(const TrueMotion& m) {
@@ -84,7 +93,6 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
     gyro -= world_.gyro_drift_rad_s * std::expm1(-m.time_s / world_.warm_up_s);
   const Vec3 accel = as_mounted(m.specific_force_B_m_s2) + accel_bias_ +
                      accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
-  attitude_packet(m.theta_rad);
 
   const auto counts = [this](double value, double per_count) {
     const double n = value / per_count;
@@ -107,19 +115,13 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
     raw.accel_counts[k] = imu_counts(accel_S(i), calibration_.accel_m_s2_per_count);
   }
   for (std::size_t k = 0; k < wheels_; ++k) {
-    const double angle = m.wheel_angle_rad[k] + encoder_noise_.gaussian(world_.encoder_sigma_rad);
+    double angle = m.wheel_angle_rad[k];
+    if (encoder_noisy_) angle += encoder_noise_.gaussian(world_.encoder_sigma_rad);
     raw.encoder_counts[k] =
         counts(calibration_.encoder_sign[k] * angle, 2.0 * kPi / calibration_.encoder_counts_per_rev);
   }
   raw.battery_counts = counts(m.battery_V - calibration_.battery_offset_V, calibration_.battery_V_per_count);
-  const auto delay = static_cast<std::size_t>(world_.attitude_latency_ticks);
-  const Vec3 attitude = attitude_history_[(attitude_head_ + kAttitudeDelay - delay) % kAttitudeDelay];
-  const auto [w, x, y, z] = quaternion_of(attitude);
-  const Eigen::Quaterniond q = Eigen::Quaterniond(w, x, y, z) * q_mounted_;
-  raw.attitude_wxyz[0] = q.w();
-  raw.attitude_wxyz[1] = q.x();
-  raw.attitude_wxyz[2] = q.y();
-  raw.attitude_wxyz[3] = q.z();
+  if (attitude_read_) attitude_packet(m.theta_rad, &raw);
   raw.valid = RIO_IMU | RIO_ENCODERS | RIO_BATTERY | RIO_ATTITUDE;
   return raw;
 }

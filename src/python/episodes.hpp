@@ -1,5 +1,5 @@
 // Robots that are reset and stepped together, on several threads: what the Gymnasium environments call. In:
-// request, actions -> out: observations, rewards, who is lost, in the caller's arrays. Simulation only.
+// request, actions -> out: observations, rewards, who is lost, in arrays that stay. Simulation only.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 
 #include "app/sim/workers.hpp"
 #include "python/simulation.hpp"
@@ -20,9 +21,6 @@ using Array = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>;
 
 class Episodes {
  public:
-  using Flags = nb::ndarray<bool, nb::numpy, nb::ndim<1>>;
-  using Numbers = nb::ndarray<double, nb::numpy, nb::ndim<1>>;
-
   /// A tick upright is worth 1, less the squares of the weighted observation and those of the action times
   /// `action_cost`, down to 0; where the robot is lost it is worth nothing.
   Episodes(const app::SimRequest& request, int count, int jobs, std::vector<double> weights,
@@ -33,6 +31,10 @@ class Episodes {
         episodes_(static_cast<std::size_t>(count)),
         weights_(std::move(weights)),
         action_cost_(action_cost),
+        observations_(episodes_.size() * static_cast<std::size_t>(width_)),
+        rewards_(episodes_.size()),
+        lost_(std::make_unique<bool[]>(episodes_.size())),
+        active_(std::make_unique<bool[]>(episodes_.size())),
         workers_(std::min(app::threads_for(jobs), static_cast<unsigned>(std::max(count, 1)))) {
     if (static_cast<int>(weights_.size()) != width())
       throw nb::value_error("every number of the observation has a weight");
@@ -44,11 +46,21 @@ class Episodes {
   int count() const { return static_cast<int>(episodes_.size()); }
   int wheels() const { return wheels_; }
 
-  /// `numbers`, unless empty: of others of the population than configured. Their rows of `observations` are
-  /// written.
+  // Views of what reset() and step() write, a row or an element per episode.
+  auto observations() {
+    return nb::ndarray<nb::numpy, double>(
+        observations_.data(), {episodes_.size(), static_cast<std::size_t>(width_)}, nb::find(this));
+  }
+  auto rewards() {
+    return nb::ndarray<nb::numpy, double>(rewards_.data(), {episodes_.size()}, nb::find(this));
+  }
+  auto lost() { return nb::ndarray<nb::numpy, bool>(lost_.get(), {episodes_.size()}, nb::find(this)); }
+  /// Who takes part in step(): from reset() until lost, or until the caller has it otherwise.
+  auto active() { return nb::ndarray<nb::numpy, bool>(active_.get(), {episodes_.size()}, nb::find(this)); }
+
+  /// `numbers`, unless empty: of others of the population than configured.
   void reset(const std::vector<int>& which, const std::vector<std::uint64_t>& seeds,
-             const std::vector<std::int64_t>& numbers, const Array& observations) {
-    check(observations, width(), "observations");
+             const std::vector<std::int64_t>& numbers) {
     if (seeds.size() != which.size() || (!numbers.empty() && numbers.size() != which.size()))
       throw nb::value_error("every episode that is reset has a seed, and a robot or none has");
     for (const int i : which) (void)at(i);
@@ -56,21 +68,21 @@ class Episodes {
     workers_.each(static_cast<int>(which.size()), [&](int job) {
       const auto k = static_cast<std::size_t>(job);
       at(which[k]) = (numbers.empty() ? make_ : makes(numbers[k]))(seeds[k]);
-      at(which[k])->observation(row(observations, which[k]));
+      at(which[k])->observation(row(which[k]));
+      const auto i = static_cast<std::size_t>(which[k]);
+      rewards_[i] = 0.0;
+      lost_[i] = false;
+      active_[i] = true;
     });
+    workers_.start(groups(), roll_);
   }
-  /// Those of `active` are stepped by their actions, which are limited to -1 .. 1; their elements of the rest
-  /// are written.
-  void step(const Array& actions, const Flags& active, const Array& observations, const Numbers& rewards,
-            const Flags& lost) {
-    check(actions, wheels_, "actions");
-    check(observations, width(), "observations");
-    for (const std::size_t n : {rewards.shape(0), lost.shape(0), active.shape(0)}) {
-      if (static_cast<int>(n) != count())
-        throw nb::value_error("active, rewards and lost have an element per episode");
-    }
+  /// Those that are active, by their actions, which are limited to -1 .. 1; how many of them are lost.
+  int step(const Array& actions) {
+    check(actions);
     const nb::gil_scoped_release others;
+    std::atomic<int> losses{0};
     const auto one = [&](int i) {
+      const auto k = static_cast<std::size_t>(i);
       const double* asked = actions.data() + std::ptrdiff_t{i} * wheels_;
       std::array<double, kMaxMotors> drive{};
       double acted = 0.0;
@@ -79,31 +91,24 @@ class Episodes {
         acted += drive[w] * drive[w];
       }
       const bool is_lost = !at(i)->step(drive.data());
-      double* observation = row(observations, i);
+      double* observation = row(i);
       at(i)->observation(observation);
       double cost = action_cost_ * acted;
-      for (std::size_t k = 0; k < weights_.size(); ++k) {
-        const double error = weights_[k] * observation[k];
+      for (std::size_t n = 0; n < weights_.size(); ++n) {
+        const double error = weights_[n] * observation[n];
         cost += error * error;
       }
-      rewards(i) = is_lost ? 0.0 : 1.0 - std::min(cost, 1.0);
-      if (lost(i) != is_lost) lost(i) = is_lost;  // one cache line of all threads: left alone where it can be
+      rewards_[k] = is_lost ? 0.0 : 1.0 - std::min(cost, 1.0);
+      if (!is_lost) return;
+      lost_[k] = true;
+      active_[k] = false;
+      ++losses;
     };
-    // In groups that fill the vector registers, as far as every thread has one; nobody's numbers depend on
-    // them.
-    const int group = std::clamp((count() + workers_.threads() - 1) / workers_.threads(), 1, kRobotsTogether);
-    workers_.each((count() + group - 1) / group, [&](int job) {
-      const int end = std::min(count(), (job + 1) * group);
-      std::array<Episode*, kRobotsTogether> members{};
-      int n = 0;
-      for (int i = job * group; i < end; ++i) {
-        if (active(i)) members[static_cast<std::size_t>(n++)] = at(i).get();
-      }
-      robot_.advance_together(members.data(), n);
-      for (int i = job * group; i < end; ++i) {
-        if (active(i)) one(i);
-      }
+    workers_.each(count(), [&](int i) {
+      if (active_[static_cast<std::size_t>(i)]) one(i);
     });
+    workers_.start(groups(), roll_);
+    return losses;
   }
   StateView truth(int i) { return at(i)->truth(); }
 
@@ -118,14 +123,26 @@ class Episodes {
     return robot_.episodes(request);
   }
   int width() const { return width_; }
-  double* row(const Array& observations, int i) const {
-    return &observations.data()[std::ptrdiff_t{i} * width()];
+  int groups() const { return (count() + kRobotsTogether - 1) / kRobotsTogether; }
+  /// What the next tick's action has no part in, while the caller thinks about it: the robots of a group roll
+  /// under the command that they have. Groups fill the vector registers; nobody's numbers depend on them.
+  void roll(int group) noexcept {
+    std::array<Episode*, kRobotsTogether> members{};
+    int n = 0;
+    for (int i = group * kRobotsTogether; i < std::min(count(), (group + 1) * kRobotsTogether); ++i) {
+      Episode* const episode = episodes_[static_cast<std::size_t>(i)].get();
+      if (episode != nullptr) members[static_cast<std::size_t>(n++)] = episode;
+    }
+    robot_.roll_ahead(members.data(), n);
   }
-  void check(const Array& array, int columns, const char* name) const {
-    if (array.ndim() != 2 || static_cast<int>(array.shape(0)) != count() ||
-        static_cast<int>(array.shape(1)) != columns)
-      throw nb::value_error((std::string(name) + ": expected " + std::to_string(count()) + " rows of " +
-                             std::to_string(columns) + " numbers")
+  double* row(int i) {
+    return &observations_[static_cast<std::size_t>(i) * static_cast<std::size_t>(width_)];
+  }
+  void check(const Array& actions) const {
+    if (actions.ndim() != 2 || static_cast<int>(actions.shape(0)) != count() ||
+        static_cast<int>(actions.shape(1)) != wheels_)
+      throw nb::value_error(("actions: expected " + std::to_string(count()) + " rows of " +
+                             std::to_string(wheels_) + " numbers")
                                 .c_str());
   }
   std::unique_ptr<Episode>& at(int i) {
@@ -141,6 +158,9 @@ class Episodes {
   std::vector<std::unique_ptr<Episode>> episodes_;
   std::vector<double> weights_;
   double action_cost_;
+  std::vector<double> observations_, rewards_;
+  std::unique_ptr<bool[]> lost_, active_;
+  const std::function<void(int)> roll_{[this](int group) { roll(group); }};
   app::Workers workers_;  // gone first
 };
 

@@ -280,10 +280,12 @@ NB_MODULE(_core, m) {
            nb::arg("count"), nb::arg("jobs"), nb::arg("weights"), nb::arg("action_cost"))
       .def_prop_ro("count", &Episodes::count)
       .def_prop_ro("wheels", &Episodes::wheels)
-      .def("reset", &Episodes::reset, nb::arg("which"), nb::arg("seeds"), nb::arg("robot_numbers"),
-           nb::arg("observations"))
-      .def("step", &Episodes::step, nb::arg("actions"), nb::arg("active"), nb::arg("observations"),
-           nb::arg("rewards"), nb::arg("lost"))
+      .def_prop_ro("observations", &Episodes::observations)
+      .def_prop_ro("rewards", &Episodes::rewards)
+      .def_prop_ro("lost", &Episodes::lost)
+      .def_prop_ro("active", &Episodes::active)
+      .def("reset", &Episodes::reset, nb::arg("which"), nb::arg("seeds"), nb::arg("robot_numbers"))
+      .def("step", &Episodes::step, nb::arg("actions"), "how many are lost")
       .def("truth", &Episodes::truth, nb::arg("index"));
 }
 

@@ -10,25 +10,38 @@
 
 namespace equipoise::python {
 
-/// A world whose next tick may have been advanced already, together with others'.
-template <class World>
+/// A world whose next tick may have been rolled already, together with others'.
+template <class World, class = void>
 class Ahead : public World {
  public:
+  static constexpr bool kRolls = false;
+  explicit Ahead(const World& world) : World(world) {}
+};
+template <class World>
+class Ahead<World, std::void_t<typename World::Rolling>> : public World {
+ public:
+  static constexpr bool kRolls = true;
   explicit Ahead(const World& world) : World(world) {}
 
-  void is_ahead() noexcept { ahead_ = true; }
+  /// The numbers to roll, once before each advance() under the same command; else, or where more is on than
+  /// they describe, nullptr.
+  typename World::Rolling* begin(const MotorCommand& command) noexcept {
+    if (rolled_ || !World::begin_rolling(command, &numbers_)) return nullptr;
+    rolled_ = true;
+    return &numbers_;
+  }
   void advance(const MotorCommand& command) {
-    if (!std::exchange(ahead_, false)) World::advance(command);
+    if (std::exchange(rolled_, false)) {
+      World::end_rolling(numbers_);
+    } else {
+      World::advance(command);
+    }
   }
 
  private:
-  bool ahead_ = false;
+  typename World::Rolling numbers_;
+  bool rolled_ = false;
 };
-
-template <class World, class = void>
-struct RollsTogether : std::false_type {};
-template <class World>
-struct RollsTogether<World, std::void_t<typename World::Rolling>> : std::true_type {};
 
 template <class Firmware, class Access>
 class SimulatedOf : public Simulated {
@@ -80,22 +93,21 @@ class SimulatedOf : public Simulated {
     };
   }
 
-  void advance_together(Episode* const* episodes, int count) const override {
-    if constexpr (RollsTogether<World>::value) {
-      std::array<typename World::Rolling, kRobotsTogether> numbers;
+  void roll_ahead(Episode* const* episodes, int count) const noexcept override {
+    if constexpr (Ahead<World>::kRolls) {
       std::array<typename World::Rolling*, kRobotsTogether> rolling{};
-      std::array<RollingEpisode*, kRobotsTogether> of{};
       std::size_t n = 0;
+      const World* any = nullptr;  // all of one configuration, but for what is drawn
       for (int i = 0; i < count; ++i) {
         auto* episode = static_cast<RollingEpisode*>(episodes[i]);
-        if (!episode->begin(&numbers[n])) continue;
-        rolling[n] = &numbers[n];
-        of[n++] = episode;
+        rolling[n] = episode->begin();
+        if (rolling[n] == nullptr) continue;
+        any = &episode->world();
+        ++n;
       }
-      if (n == 0) return;
-      const World& any = of[0]->world();  // all of one configuration, but for what is drawn
-      roll_together(rolling.data(), static_cast<int>(n), any.bridge(), any.steps_per_tick(), any.step_s());
-      for (std::size_t i = 0; i < n; ++i) of[i]->end(numbers[i]);
+      if (n > 0)
+        roll_together(rolling.data(), static_cast<int>(n), any->bridge(), any->steps_per_tick(),
+                      any->step_s());
     }
   }
 
@@ -130,9 +142,9 @@ class SimulatedOf : public Simulated {
       const Pipeline* flying = nullptr;
       app::FeedbackHook<Robot, Reference> feedback;
       if (hooks.controller) {
-        feedback = [&](const Reference& reference, const Input& u_own) -> Input {
+        feedback = [&](const Reference& reference, const app::OwnFeedback<Robot>& asked) -> Input {
           return hooks.controller({world.time_s(), view(flying->estimators().controlling(), config.robot),
-                                   view(reference, config.robot), Access::error(reference), u_own});
+                                   view(reference, config.robot), Access::error(reference), asked()});
         };
       }
       Pipeline pipeline(app::hooked<Own>(own.params(), feedback));
@@ -156,15 +168,9 @@ class SimulatedOf : public Simulated {
   /// Whose world may be advanced together with others'.
   class RollingEpisode : public Episode {
    public:
-    template <class Rolling>
-    bool begin(Rolling* robot) noexcept {
+    auto begin() noexcept {
       const MotorCommand* command = next_command();
-      return command != nullptr && world_.begin_rolling(*command, robot);
-    }
-    template <class Rolling>
-    void end(const Rolling& robot) noexcept {
-      world_.end_rolling(robot);
-      world_.is_ahead();
+      return command != nullptr ? world_.begin(*command) : nullptr;
     }
     const World& world() const noexcept { return world_; }
 
@@ -184,9 +190,9 @@ class SimulatedOf : public Simulated {
           kinematics_(config.robot),
           robot_(config.robot),
           pipeline_(app::hooked<Own>(params,
-                                     [this](const Reference& r, const Input& own) -> Input {
+                                     [this](const Reference& r, const app::OwnFeedback<Robot>& own) -> Input {
                                        reference_ = r;
-                                       return acts_ ? u_ : own;
+                                       return acts_ ? u_ : own();
                                      })),
           run_(world_, pipeline_, Firmware::rolling_radius_m(config),
                app::options_for<Firmware>(request, config), observe_, stop_) {

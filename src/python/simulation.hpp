@@ -71,9 +71,9 @@ class Simulated {
                              const app::TickObserver& observe, const std::atomic<bool>& stop) const = 0;
   /// f(seed): configured once, as many episodes as are wanted.
   virtual std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const = 0;
-  /// Before their next step(), which then finds their worlds advanced: at most kRobotsTogether of one
-  /// configuration and robot type, in vector registers, those that fit there.
-  virtual void advance_together(Episode* const* episodes, int count) const = 0;
+  /// Before their next step(), which then finds the numbers of its world: at most kRobotsTogether of one
+  /// configuration and robot type, in vector registers, those that fit there. Nothing of it shows until then.
+  virtual void roll_ahead(Episode* const* episodes, int count) const noexcept = 0;
   /// Row by row: gyro, accelerometer, attitude (3 each), battery, wheel angles. `toml`: of the run's log.
   virtual void calibrate(const std::string& toml, const std::vector<RawSample>& raw, double* out) const = 0;
 };

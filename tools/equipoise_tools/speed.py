@@ -187,6 +187,8 @@ def filter_code(root: Path, build: str, nm: str) -> dict[str, int] | None:
         words = line.split(None, 3)
         if len(words) < 4 or words[2].upper() not in ("T", "W") or words[3] in seen:
             continue
+        if "[clone ." in words[3] and not words[3].endswith("[clone .default]"):  # for some processors alone
+            continue
         seen.add(words[3])
         for robot, states in (("mbbr", 18), ("mip", 14)):
             steps = tuple(f"{robot.capitalize()}Filter::{f}(" for f in ("predict", "correct", "ahead"))

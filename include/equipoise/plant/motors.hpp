@@ -33,18 +33,43 @@ struct BridgesOf {
   }
 };
 
+/// The battery that feeds them, as the bridges of one robot draw on it.
+template <class Real, int N>
+struct SupplyOf {
+  Real open_V, resistance_ohm, battery_V;
+  Real motor_ohm, torque_constant_N_m_A, torque_scale, back_emf_scale;  // of every motor
+
+  /// Terminal voltage under the mean supply current; a bridge's is |duty| times the motor current while
+  /// driven.
+  template <class Duty>
+  void draw(const Duty& duty, const VecOf<Real, N>& wheel_rate_rad_s, BridgesOf<Real, N>* bridges) noexcept {
+    using std::abs;
+    Real supply_A(0.0);
+    for (int i = 0; i < N; ++i) {
+      const Real u(duty[i]);
+      const Real omega_r = wheel_rate_rad_s(i) / bridges->no_load_rad_s;
+      supply_A += abs(u * (battery_V / motor_ohm) * (u - omega_r));
+    }
+    battery_V = open_V - resistance_ohm * supply_A;
+    feed(bridges);
+  }
+  /// What follows from the battery's voltage.
+  void feed(BridgesOf<Real, N>* bridges) const noexcept {
+    bridges->stall_torque_N_m = torque_scale * torque_constant_N_m_A * (battery_V / motor_ohm);
+    bridges->no_load_rad_s = battery_V / torque_constant_N_m_A / back_emf_scale;
+  }
+};
+
 template <int N>
 class SimulatedMotors {
  public:
   SimulatedMotors(const MotorParameters& motor, const Calibration& calibration, const WorldParams& world)
       : motor_(motor),
         calibration_(calibration),
-        torque_scale_(world.actual.torque),
-        back_emf_scale_(world.actual.back_emf),
-        open_V_(world.battery_V),
-        resistance_ohm_(world.battery_resistance_ohm),
-        diode_drop_V_(world.diode_drop_V),
-        battery_V_(world.battery_V) {
+        supply_{world.battery_V,      world.battery_resistance_ohm, world.battery_V,
+                motor.resistance_ohm, motor.torque_constant_N_m_A,  world.actual.torque,
+                world.actual.back_emf},
+        diode_drop_V_(world.diode_drop_V) {
     supplied();
   }
 
@@ -62,7 +87,7 @@ class SimulatedMotors {
     }
   }
   bool enabled() const noexcept { return command_.enable; }
-  double battery_V() const noexcept { return battery_V_; }
+  double battery_V() const noexcept { return supply_.battery_V; }
 
   Vec<N> torque(const Vec<N>& wheel_rate_rad_s) const noexcept {
     if (!command_.enable) return Vec<N>::Zero();  // all switches open: the current decays at once
@@ -80,43 +105,36 @@ class SimulatedMotors {
     return command_.enable && !drops() ? &bridges_ : nullptr;
   }
   BridgeType type() const noexcept { return motor_.bridge; }
+  const SupplyOf<double, N>& supply() const noexcept { return supply_; }
 
-  /// Terminal voltage under the mean supply current; a bridge's is |duty| times the motor current while
-  /// driven.
   void update_battery(const Vec<N>& wheel_rate_rad_s) noexcept {
-    if (resistance_ohm_ == 0.0) return;
-    double supply_A = 0.0;
-    for (int i = 0; i < N && command_.enable; ++i) {
-      const double duty = command_.duty[static_cast<std::size_t>(i)];
-      const double omega_r = wheel_rate_rad_s(i) / bridges_.no_load_rad_s;
-      supply_A += std::abs(duty * motor_.stall_current_A(battery_V_) * (duty - omega_r));
+    if (supply_.resistance_ohm == 0.0) return;
+    if (command_.enable) {
+      supply_.draw(command_.duty, wheel_rate_rad_s, &bridges_);
+    } else {
+      supply_.battery_V = supply_.open_V;
     }
-    battery_V_ = open_V_ - resistance_ohm_ * supply_A;
     supplied();
   }
 
   /// Torque lost per rad/s of a wheel while its bridge drives. (5.12)
-  double damping_N_m_s() const noexcept { return torque_scale_ * back_emf_scale_ * motor_.k2(); }
+  double damping_N_m_s() const noexcept {
+    return supply_.torque_scale * supply_.back_emf_scale * motor_.k2();
+  }
 
  private:
   /// Diodes carry the current of a drive/coast bridge alone.
   bool drops() const noexcept { return diode_drop_V_ != 0.0 && motor_.bridge == BridgeType::kDriveCoast; }
   /// What follows from the battery's voltage.
   void supplied() noexcept {
-    bridges_.stall_torque_N_m =
-        torque_scale_ * motor_.torque_constant_N_m_A * motor_.stall_current_A(battery_V_);
-    bridges_.no_load_rad_s = motor_.no_load_rad_s(battery_V_) / back_emf_scale_;
-    diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
+    supply_.feed(&bridges_);
+    diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / supply_.battery_V;
   }
 
   MotorParameters motor_;
   Calibration calibration_;
-  double torque_scale_;
-  double back_emf_scale_;
-  double open_V_;
-  double resistance_ohm_;
+  SupplyOf<double, N> supply_;
   double diode_drop_V_;
-  double battery_V_;
   double diodes_oppose_ = 1.0;
   MotorCommand command_{};
   BridgesOf<double, N> bridges_;

@@ -45,13 +45,16 @@ class SimulatedSensors {
   bool aged() const noexcept { return aged_; }
   void feel(const Felt& felt) noexcept { past_.add(felt); }
 
+  /// From now on nobody reads the attitude packets, a third of the work: they come without their angles.
+  void without_attitude() noexcept { attitude_read_ = false; }
+
   /// What the devices report; late by the world's latency, stamped with the time of asking.
   RawSample sense(const TrueMotion& m);
 
  private:
   TrueMotion as_felt(const TrueMotion& m) noexcept;
   RawSample sense_now(const TrueMotion& m);
-  void attitude_packet(const Vec3& theta_rad);
+  void attitude_packet(const Vec3& theta_rad, RawSample* raw);
 
   Calibration calibration_;
   WorldParams world_;
@@ -60,9 +63,12 @@ class SimulatedSensors {
   Vec3 gyro_bias_, accel_bias_;
   bool misaligned_;
   bool aged_;
+  bool encoder_noisy_;
   DelayLine past_;
   Mat3 R_misaligned_;
   Eigen::Quaterniond q_mounted_;  // as the chip believes itself to be mounted
+  bool attitude_read_ = true;
+  double attitude_keep_, attitude_kick_rad_, heading_kick_rad_;  // of the error, per tick
   Vec3 attitude_error_ = Vec3::Zero();
   static constexpr std::size_t kAttitudeDelay = 16;
   std::array<Vec3, kAttitudeDelay> attitude_history_{};

@@ -15,9 +15,11 @@ using EstimatorHook =
     std::function<typename Robot::Estimate(const typename Robot::Sample& z, const Vec<Robot::kInputs>& u,
                                            bool held, const typename Robot::Estimate& own)>;
 
-/// `own`: what the robot's feedback would do.
+/// `own()`: what the robot's feedback would do; who never asks does not pay for it.
+template <class Robot>
+using OwnFeedback = std::function<Vec<Robot::kInputs>()>;
 template <class Robot, class Reference>
-using FeedbackHook = std::function<Vec<Robot::kInputs>(const Reference&, const Vec<Robot::kInputs>& own)>;
+using FeedbackHook = std::function<Vec<Robot::kInputs>(const Reference&, const OwnFeedback<Robot>& own)>;
 
 template <class Robot, class Base>
 class HookedEstimators : public Base {
@@ -52,8 +54,8 @@ class HookedFeedback {
   explicit HookedFeedback(const Params& params) : own_(params.own), hook_(params.hook) {}
 
   Vec<Robot::kInputs> update(const Reference& reference) noexcept {
-    const Vec<Robot::kInputs> own = own_.update(reference);
-    return hook_ ? hook_(reference, own) : own;
+    if (!hook_) return own_.update(reference);
+    return hook_(reference, [&] { return own_.update(reference); });
   }
 
  private:

@@ -29,7 +29,9 @@ class SimulatedRun {
         hardware_(backend_.io()),
         meter_(Estimators::kCount, rolling_radius_m),
         supervisor_({nullptr, 0, options.log_failed, true}),
-        end_tick_(static_cast<std::int64_t>(std::llround(options.duration_s * kTickHz))) {}
+        end_tick_(static_cast<std::int64_t>(std::llround(options.duration_s * kTickHz))) {
+    if (!observe && !pipeline.estimators().reads_attitude()) world.without_attitude();
+  }
   SimulatedRun(const SimulatedRun&) = delete;
   SimulatedRun& operator=(const SimulatedRun&) = delete;
 
@@ -70,7 +72,8 @@ class SimulatedRun {
 
   auto commands() {
     return [this](std::int64_t, std::int64_t) {
-      pipeline_.estimators().observe_truth(world_.truth());
+      if (pipeline_.estimators().runs(Estimators::Id::kTruth))
+        pipeline_.estimators().observe_truth(world_.truth());
       return options_.script.at(world_.time_s());
     };
   }

@@ -2,7 +2,7 @@
 // -> out: all done when each() returns; the first exception ends the rest and is thrown again. Each thread
 // has its own share of the numbers, the same in every round, so that its cache keeps what belongs to them;
 // who is done takes from the others' shares. Jobs that share nothing give the same results with any number of
-// threads. One caller at a time.
+// threads. One caller at a time, who may leave a round to the others meanwhile: start(), finish().
 #pragma once
 
 #include <algorithm>
@@ -14,6 +14,7 @@
 #include <functional>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace equipoise::app {
@@ -43,19 +44,23 @@ class Workers {
   int threads() const noexcept { return static_cast<int>(shares_.size()); }
 
   void each(int count, const std::function<void(int)>& job) {
-    const auto threads = static_cast<std::int64_t>(shares_.size());
-    for (std::int64_t i = 0; i < threads; ++i) {
-      Share& share = shares_[static_cast<std::size_t>(i)];
-      share.next = static_cast<int>(count * i / threads);
-      share.end = static_cast<int>(count * (i + 1) / threads);
-    }
-    job_ = &job;
-    failure_ = nullptr;
-    failed_ = false;
+    finish();
+    share_out(count, job);
     if (count > 1) open();
-    work(0);
-    close();
-    if (failure_) std::rethrow_exception(failure_);
+    complete();
+  }
+
+  /// The others begin; the caller goes about its own business, and `job` lives on, until finish(), which any
+  /// other call is, too.
+  void start(int count, const std::function<void(int)>& job) {
+    finish();
+    share_out(count, job);
+    started_ = true;
+    open();
+  }
+  /// What is left of what was started.
+  void finish() {
+    if (std::exchange(started_, false)) complete();
   }
 
  private:
@@ -66,6 +71,24 @@ class Workers {
     std::atomic<int> next{0};
     int end = 0;
   };
+
+  void share_out(int count, const std::function<void(int)>& job) {
+    const auto threads = static_cast<std::int64_t>(shares_.size());
+    for (std::int64_t i = 0; i < threads; ++i) {
+      Share& share = shares_[static_cast<std::size_t>(i)];
+      share.next = static_cast<int>(count * i / threads);
+      share.end = static_cast<int>(count * (i + 1) / threads);
+    }
+    job_ = &job;
+    failure_ = nullptr;
+    failed_ = false;
+  }
+
+  void complete() {
+    work(0);
+    close();
+    if (failure_) std::rethrow_exception(failure_);
+  }
 
   // What state_ counts: rounds, threads at work beside the caller, and whether more may join them.
   static constexpr std::uint64_t kOpen = 1;
@@ -158,6 +181,7 @@ class Workers {
   std::vector<std::thread> others_;
   std::atomic<std::uint64_t> state_{0};
   const std::function<void(int)>* job_ = nullptr;
+  bool started_ = false;  // and not finished
   std::atomic<bool> failed_{false};
   std::exception_ptr failure_;
   std::mutex mutex_;

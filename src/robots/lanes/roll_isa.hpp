@@ -55,10 +55,13 @@ void roll_all(One* const* robots, int count, BridgeType type, int steps, double 
   }
 }
 
-void roll(MbbrRollingOf<double>* const* robots, int count, BridgeType type, int steps, double h) noexcept {
+// Flat: what stays a function takes and gives its vectors through memory: two fifths more time.
+[[gnu::flatten]] void roll(MbbrRollingOf<double>* const* robots, int count, BridgeType type, int steps,
+                           double h) noexcept {
   roll_all<MbbrRollingOf<Real>>(robots, count, type, steps, h);
 }
-void roll(MipRollingOf<double>* const* robots, int count, BridgeType type, int steps, double h) noexcept {
+[[gnu::flatten]] void roll(MipRollingOf<double>* const* robots, int count, BridgeType type, int steps,
+                           double h) noexcept {
   roll_all<MipRollingOf<Real>>(robots, count, type, steps, h);
 }
 

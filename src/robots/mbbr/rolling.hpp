@@ -135,6 +135,9 @@ struct MbbrRollingOf {
   Real ratio;    // r / r_w
   Real T_ob[9];  // columns: the wheels' axes
   BridgesOf<Real, Mbbr::kWheels> bridges;
+  SupplyOf<Real, Mbbr::kWheels> supply;
+  Real duty[Mbbr::kWheels];  // as commanded
+  Real specific_force_B[3];  // m/s^2, at the IMU at the end of the ticks
 };
 
 /// Its drive.
@@ -147,7 +150,10 @@ class MbbrEvenDriveOf {
       : robot_(robot), type_(type), T_ob_(Eigen::Map<const MatOf<Real, 3, 3>>(robot.T_ob)) {}
 
   V3 wheel_torques(const V3& relative_rate_B) const noexcept {
-    return robot_.bridges.torque(type_, wheels_from_ball<Real>(robot_.ratio, T_ob_, relative_rate_B));
+    return robot_.bridges.torque(type_, wheel_rates(relative_rate_B));
+  }
+  V3 wheel_rates(const V3& relative_rate_B) const noexcept {
+    return wheels_from_ball<Real>(robot_.ratio, T_ob_, relative_rate_B);
   }
   V3 torque_B(const V3& wheel_torque, const V3& friction_B) const noexcept {
     return axes_from_wheels<Real>(robot_.ratio, T_ob_, wheel_torque) + friction_B;
@@ -160,7 +166,7 @@ class MbbrEvenDriveOf {
   MatOf<Real, 3, 3> T_ob_;
 };
 
-/// Steps of `h` seconds, as MbbrWorld::step() where nothing of what it may have is on.
+/// A tick's steps of `h` seconds, as MbbrWorld::step() where nothing of what it may have is on.
 template <class Real>
 void roll(MbbrRollingOf<Real>* robot, BridgeType type, int steps, double h) noexcept {
   using Instant = MbbrInstantOf<Real>;
@@ -171,14 +177,18 @@ void roll(MbbrRollingOf<Real>* robot, BridgeType type, int steps, double h) noex
   const VecOf<Real, 3> mobility = Eigen::Map<const VecOf<Real, 3>>(robot->mobility);
   State s = Eigen::Map<const State>(robot->state);
   MbbrHereOf<Real> here(s);
-  for (int i = 0; i < steps; ++i) {
+  VecOf<Real, 3> friction;
+  const auto rubbed = [&] {
     Instant free(here);
     free.drive(drive, robot->viscous_N_m_s, none);
     free.roll(dynamics);
-    const VecOf<Real, 3> friction = uncoupled_coulomb_torque<Real, 3>(
+    friction = uncoupled_coulomb_torque<Real, 3>(
         free.relative_after(h), mobility, h,
         sliding_friction_N_m(robot->coulomb_N_m, robot->yaw_positive, robot->yaw_negative, free.relative_B));
-    const Instant now = free.with_friction(dynamics, drive, friction);
+    return free.with_friction(dynamics, drive, friction);
+  };
+  for (int i = 0; i < steps; ++i) {
+    const Instant now = rubbed();
     const State next = rk4_step(s, State(now.derivative(drive)), h, [&](const State& at) {
       Instant then(MbbrHereOf<Real>(here, at, at(mbbr_at::kTheta + 2) - s(mbbr_at::kTheta + 2)));
       then.drive(drive, robot->viscous_N_m_s, friction);
@@ -189,6 +199,9 @@ void roll(MbbrRollingOf<Real>* robot, BridgeType type, int steps, double h) noex
     s = next;
   }
   Eigen::Map<State>(robot->state) = s;
+  robot->supply.draw(robot->duty, drive.wheel_rates(here.relative_B), &robot->bridges);
+  const Instant then = rubbed();
+  Eigen::Map<VecOf<Real, 3>>(robot->specific_force_B) = -dynamics.accelerometer_B(then.motion, then.a);
 }
 
 }  // namespace equipoise

@@ -141,10 +141,14 @@ MbbrFriction MbbrWorld::slip_friction(const State& s, const Instant& free, doubl
 }
 
 Felt MbbrWorld::felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
+  return felt(m.omega_B, -dynamics_.accelerometer_B(m, a));
+}
+
+Felt MbbrWorld::felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept {
   Felt felt;
   felt.time_s = time_s_;
-  felt.omega_B_rad_s = m.omega_B;
-  felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(m, a);
+  felt.omega_B_rad_s = omega_B;
+  felt.specific_force_B_m_s2 = specific_force_B;
   felt.wheel_angle_rad.head<3>() =
       kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) + drive_.encoder_offset_rad();
   return felt;
@@ -220,6 +224,7 @@ void MbbrWorld::step(double h) noexcept {
 
 void MbbrWorld::advance(const MotorCommand& command) {
   if (command.enable) held_ = false;
+  rolled_ = false;
   const double h = world_.common.step_s;
   const int steps = steps_per_tick();
   const double taken_at = world_.common.actuation_steps();
@@ -266,16 +271,21 @@ bool MbbrWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexc
   robot->ratio = robot_.r / robot_.r_w;
   Eigen::Map<Mat3>(robot->T_ob) = kinematics_.T_ob();
   robot->bridges = *motors_.bridges();
+  robot->supply = motors_.supply();
+  std::copy_n(command.duty, Mbbr::kWheels, robot->duty);
   return true;
 }
 
 void MbbrWorld::end_rolling(const Rolling& robot) noexcept {
   s_ = Eigen::Map<const State>(robot.state);
   for (int i = 0; i < steps_per_tick(); ++i) time_s_ += world_.common.step_s;
+  rolled_ = world_.process_noise_sigma.isZero(0.0);
+  rolled_force_B_ = Eigen::Map<const Vec3>(robot.specific_force_B);
   end_tick();
 }
 
 Felt MbbrWorld::felt_now() const noexcept {
+  if (rolled_) return felt(s_.segment<3>(kOmega), rolled_force_B_);
   if (slipping_) {
     Instant now(here_);
     forces(&now, push_now(), friction_.axes_B);

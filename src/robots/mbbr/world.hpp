@@ -48,6 +48,7 @@ class MbbrWorld {
 
   /// What the devices report now.
   RawSample sense();
+  void without_attitude() noexcept { sensors_.without_attitude(); }
 
   MbbrEstimate truth() const noexcept;
   const MbbrParameters& robot() const noexcept { return robot_; }  // as built
@@ -84,6 +85,7 @@ class MbbrWorld {
   Vec2 pull_star(const Instant& now) const noexcept;
   Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
   Felt felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
+  Felt felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept;
   Felt felt_now() const noexcept;
   void step(double h) noexcept;
   void load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a, double h) noexcept;
@@ -107,6 +109,8 @@ class MbbrWorld {
   double time_s_ = 0.0;
   bool held_ = true;
   bool slipping_ = false;
+  bool rolled_ = false;  // the last tick, and what is felt since is known
+  Vec3 rolled_force_B_ = Vec3::Zero();
   MbbrFriction friction_;  // of the last step
 };
 

@@ -49,6 +49,7 @@ class MipWorld {
 
   /// What the devices report now.
   RawSample sense();
+  void without_attitude() noexcept { sensors_.without_attitude(); }
 
   MipEstimate truth() const noexcept;
   const MipParameters& robot() const noexcept { return robot_; }  // as built

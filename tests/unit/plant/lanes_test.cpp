@@ -66,10 +66,13 @@ struct OfMbbr {
     p.yaw_friction_scale = Vec2(1.1, 0.9);
     return {MbbrParameters{}, MotorParameters{}, Calibration{}, p};
   }
-  static Vec<11> numbers(const World& world) {
+  static Vec<20> numbers(World& world) {
     const MbbrEstimate x = world.truth();
-    Vec<11> v;
-    v << x.theta_xy, x.theta_z, x.omega_B, x.phi_dot_star, x.phi, world.battery_V();
+    const RawSample felt = world.sense();
+    Vec<20> v;
+    v << x.theta_xy, x.theta_z, x.omega_B, x.phi_dot_star, x.phi, world.battery_V(),
+        Eigen::Map<const Vec3>(felt.gyro_counts), Eigen::Map<const Vec3>(felt.accel_counts) / 1000.0,
+        Eigen::Map<const Vec3>(felt.encoder_counts);
     return v;
   }
 };
@@ -89,7 +92,7 @@ struct OfMip {
     motor.bridge = BridgeType::kDriveBrake;
     return {robot, motor, Calibration{}, p};
   }
-  static Vec<9> numbers(const World& world) {
+  static Vec<9> numbers(World& world) {
     const MipEstimate x = world.truth();
     Vec<9> v;
     v << x.theta, x.phi, x.psi, x.theta_dot, x.phi_dot, x.psi_dot, x.position_W_m, world.battery_V();
