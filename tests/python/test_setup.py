@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -130,6 +131,43 @@ def test_a_build_folder_of_another_tree_is_made_anew(machine, tmp_path):
     assert [call.split(" -j")[0] for call in third] == calls
     assert "build/host was made for another folder" in result.stderr
     assert not (tree / "build/host/equipoise").exists()
+
+
+BESIDE = """
+ensure_python() { %s; }
+install_packages() { echo "packages $*" >>"$CALLS"; %s; }
+flock() { :; }
+setup host test
+echo built >>"$CALLS"
+"""
+
+
+def test_python_is_set_up_beside_the_packages_that_it_does_not_need(machine, tmp_path):
+    meet = f'until [ -e "{tmp_path}/python" ]; do :; done'
+    python = f'echo python >>"$CALLS"; touch "{tmp_path}/python"'
+    result, calls = machine(script=BESIDE % (python, f'[ "$*" = host ] || {{ {meet}; }}'))
+    assert result.returncode == 0, result.stderr
+    assert calls[0] == "packages host" and calls[-1] == "built"
+    assert set(calls[1:-1]) == {"python", "packages host test"}
+
+
+def test_a_failure_beside_the_packages_ends_the_set_up(machine):
+    result, calls = machine(script=BESIDE % ('die "no pip"', ":"))
+    assert result.returncode == 1
+    assert result.stderr == "error: no pip\n"
+    assert "built" not in calls
+
+
+@pytest.mark.parametrize("end", ['die "no apt"', "kill -INT $$"])
+def test_what_runs_beside_ends_with_the_set_up(machine, tmp_path, end):
+    """Its output is ours: the call returns when both have ended."""
+    python = f'touch "{tmp_path}/python"; /usr/bin/sleep 60; echo late >>"$CALLS"'
+    wait = f'[ "$*" = host ] || {{ until [ -e "{tmp_path}/python" ]; do :; done; {end}; }}'
+    began = time.monotonic()
+    result, calls = machine(script=BESIDE % (python, wait))
+    assert result.returncode in (1, 130)
+    assert "late" not in calls and "built" not in calls
+    assert time.monotonic() - began < 30
 
 
 def test_an_ordinary_user_installs_through_sudo(machine):

@@ -13,6 +13,7 @@ jobs=$(nproc)
 
 say() { printf '%s\n' "$*" >&2; }
 die() {
+  end_beside
   say "error: $*"
   exit 1
 }
@@ -23,8 +24,24 @@ bad_usage() {
 
 # Ctrl-C: the child got the signal too and has cleaned up by now; leave with the conventional code.
 leave_on_signals() {
-  trap 'trap - INT TERM; say ""; say "interrupted"; exit 130' INT
-  trap 'trap - INT TERM; say "terminated"; exit 143' TERM
+  trap 'trap - INT TERM; end_beside; say ""; say "interrupted"; exit 130' INT
+  trap 'trap - INT TERM; end_beside; say "terminated"; exit 143' TERM
+}
+
+# run_beside COMMAND...: at the same time as what follows, in a process group of its own, which can be ended whole.
+beside=
+run_beside() {
+  set -m
+  { trap - INT TERM && "$@"; } </dev/null &
+  beside=$!
+  set +m
+}
+await_beside() {
+  wait "$beside" || exit # it has said why
+  beside=
+}
+end_beside() {
+  [ -z "$beside" ] || kill -- "-$beside" 2>/dev/null || true
 }
 leave_on_signals
 
@@ -160,14 +177,21 @@ build() {
   (cd "$root" && cmake --build "build/$preset" -j "$jobs" "${arguments[@]}" >&2) || die "the build failed (see above)"
 }
 
+ensure_python() {
+  ensure_venv
+  ensure_page
+}
+
 # setup GROUP...: one at a time per tree, so that two commands started together do not install over each other.
+# apt and pip, which keep one core busy each, work side by side.
 setup() {
   mkdir -p "$root/build"
   exec 8>"$root/build/.setup.lock"
   flock -n 8 || { say "waiting for another command to finish its set-up in this tree" && flock 8; }
+  install_packages host
+  run_beside ensure_python
   install_packages "$@"
-  ensure_venv
-  ensure_page
+  await_beside
   flock -u 8
   exec 8>&-
 }
