@@ -245,11 +245,13 @@ class TestClangTidy:
         assert tidy.clang_tidy(tree) == []
         assert len(list((project / "build/host/tidy").iterdir())) == 1
 
-    def test_files_compiled_as_one_unit_are_looked_at_together_and_analyzed_alone(self, project):
+    def test_files_compiled_as_one_unit_are_looked_at_and_analyzed_together(self, project):
         tree = planted(
             project,
             src__a_cpp="int a(const int* p) {\n  if (p == nullptr) return *p;\n  return 0;\n}\n",
-            src__b_cpp="int b() {\n  int x;\n  return x;\n}\n",
+            src__b_cpp='#include "b.hpp"\nint b() {\n  int x;\n  return x;\n}\n',
+            src__b_hpp='#include "no.cpp"\n',
+            src__no_cpp="",
         )
         unit = project / "build/host/Unity/unit.cxx"
         unit.parent.mkdir()
@@ -258,7 +260,8 @@ class TestClangTidy:
         (project / "build/host/compile_commands.json").write_text(json.dumps([entry]))
         findings = [(f.path, f.line, f.message) for f in tidy.clang_tidy(tree)]
         assert any(p == "src/a.cpp" and n == 2 and "NullDereference" in m for p, n, m in findings)
-        assert any(p == "src/b.cpp" and n == 2 and "init-variables" in m for p, n, m in findings)
+        assert any(p == "src/b.cpp" and n == 3 and "init-variables" in m for p, n, m in findings)
+        assert any(p == "src/b.hpp" and n == 1 and "suspicious-include" in m for p, n, m in findings)
         planted(project, src__a_cpp="int a() { return 1; }\n", src__b_cpp="int b() { return 2; }\n")
         assert tidy.clang_tidy(tree) == []
 

@@ -22,16 +22,15 @@ ANALYZER = [
     f"--extra-arg={word}"
     for word in ("-Xclang", "-analyzer-config", "-Xclang", "c++-template-inlining=false")
 ]
-SOURCES_INCLUDED = "bugprone-suspicious-include"  # which a folder's unit does
 _DIAGNOSTIC = re.compile(r"^(?P<path>/[^:\n]+):(?P<line>\d+):\d+: (?:warning|error): (?P<message>.*)$", re.M)
 
 
 @dataclass(frozen=True)
 class Job:
-    """A translation unit and what is looked for in it."""
+    """A translation unit: a file of ours, or a folder's sources one after the other in a file of its own."""
 
     entry: dict  # of a compile database
-    checks: str = ""  # added to those of .clang-tidy
+    members: tuple[Path, ...] = ()
 
     @property
     def file(self) -> Path:
@@ -41,38 +40,52 @@ class Job:
     def command(self) -> list[str]:
         return self.entry.get("arguments") or shlex.split(self.entry["command"])
 
+    def place(self, path: str, line: int) -> tuple[str, int]:
+        """Where a line of the unit is in the sources."""
+        if self.members and Path(path) == self.file:
+            for member in self.members:
+                lines = len(_text(member).splitlines())
+                if line <= lines:
+                    return str(member), line
+                line -= lines
+        return path, line
+
+
+def _text(member: Path) -> str:
+    text = member.read_text(encoding="utf-8", errors="replace")
+    return text if text.endswith("\n") else text + "\n"
+
 
 def own(path: Path, root: Path) -> bool:
     return any(path.resolve().is_relative_to(root / folder) for folder in ("src", "drivers"))
 
 
-def jobs_of(tree: Tree, build: Path) -> list[Job]:
-    """Of a folder that is compiled as one unit: all but the analyzer on the unit, so that its headers are
-    read once; the analyzer, which skips what is included, on every file."""
-    words = re.split(r"[\s,]+", (tree.root / ".clang-tidy").read_text())
-    analyzer = [word for word in words if "clang-analyzer" in word]
-    file_by_file = ",".join(["-*", SOURCES_INCLUDED, *analyzer])
+def jobs_of(tree: Tree, build: Path, folder: Path) -> list[Job]:
+    """A folder that is compiled as one unit is looked at as one, so that its headers are read once: in a
+    file that holds its sources, for the analyzer skips what is included."""
     jobs = []
     for entry in json.loads((build / "compile_commands.json").read_text()):
         unit = Path(entry["directory"], entry["file"])
         if unit.parent.name != "Unity":
             jobs += [Job(entry)] if own(unit, tree.root) else []
             continue
-        members = [Path(member) for _, member, _ in includes(unit.read_text())]
+        members = tuple(Path(member) for _, member, _ in includes(unit.read_text()))
         if not any(own(member, tree.root) for member in members):
             continue
-        jobs.append(Job(entry, f"-clang-analyzer-*,-{SOURCES_INCLUDED}"))
-        command = Job(entry).command
-        for member in members:
-            arguments = [str(member) if Path(part) == unit else part for part in command]
-            alone = {"directory": entry["directory"], "file": str(member), "arguments": arguments}
-            jobs.append(Job(alone, file_by_file))
+        together = folder / f"{unit.parent.parent.stem}_{unit.stem}.cpp"
+        together.write_text("".join(map(_text, members)))
+        arguments = [str(together) if Path(part) == unit else part for part in Job(entry).command]
+        for beside in sorted({str(member.parent) for member in members}):
+            arguments[1:1] = ["-iquote", beside]
+        entry = {"directory": entry["directory"], "file": str(together), "arguments": arguments}
+        jobs.append(Job(entry, members))
     return jobs
 
 
 def include_folders(command: list[str], root: Path) -> list[Path]:
     folders = [part[2:] for part in command if part.startswith("-I") and len(part) > 2]
-    folders += [command[i + 1] for i, part in enumerate(command[:-1]) if part in ("-I", "-isystem")]
+    options = ("-I", "-iquote", "-isystem")
+    folders += [command[i + 1] for i, part in enumerate(command[:-1]) if part in options]
     return [Path(folder) for folder in folders if Path(folder).is_relative_to(root)]
 
 
@@ -95,7 +108,7 @@ def closure(file: Path, folders: list[Path]) -> set[Path]:
 
 def fingerprint(job: Job, root: Path, settings: bytes) -> str:
     digest = hashlib.sha256(settings)
-    digest.update(shlex.join([*job.command, job.checks]).encode())
+    digest.update(shlex.join(job.command).encode())
     for path in sorted(closure(job.file, include_folders(job.command, root))):
         digest.update(str(path).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
@@ -103,11 +116,11 @@ def fingerprint(job: Job, root: Path, settings: bytes) -> str:
 
 def run(job: Job, root: Path, database: Path) -> list[Finding]:
     command = [TOOL, "--quiet", *ANALYZER, "-p", str(database)]
-    command += [f"--checks={job.checks}"] if job.checks else []
     result = subprocess.run([*command, str(job.file)], cwd=root, capture_output=True, text=True)
     findings = []
     for match in _DIAGNOSTIC.finditer(result.stdout):
-        findings.append(Finding(os.path.relpath(match["path"], root), int(match["line"]), match["message"]))
+        path, line = job.place(match["path"], int(match["line"]))
+        findings.append(Finding(os.path.relpath(path, root), line, match["message"]))
     if result.returncode != 0 and not findings:
         said = (result.stderr or result.stdout).strip()[-500:]
         findings.append(Finding(os.path.relpath(job.file, root), 0, f"{TOOL} failed: {said}"))
@@ -122,9 +135,9 @@ def clang_tidy(tree: Tree, build: Path | None = None, jobs: int | None = None) -
         return [Finding(str(build), 0, "has no compile_commands.json; configure first: cmake --preset host")]
     cache = build / "tidy"
     cache.mkdir(exist_ok=True)
-    todo = jobs_of(tree, build)
     database = build / "tidy-database"
     database.mkdir(exist_ok=True)
+    todo = jobs_of(tree, build, database)
     (database / "compile_commands.json").write_text(json.dumps([job.entry for job in todo]))
     version = subprocess.run([TOOL, "--version"], capture_output=True, check=True).stdout
     settings = (tree.root / ".clang-tidy").read_bytes() + version + " ".join(ANALYZER).encode()
