@@ -31,6 +31,8 @@ class CartPendulumWorld {
     time_s_ += kTickS;
   }
 
+  void without_attitude() noexcept { sensors_.without_attitude(); }
+
   RawSample sense() {
     const Vec<4> d = derivative(s_);
     const double x_ddot = held_ ? 0.0 : robot_.wheel_radius_m * d(3);
