@@ -22,6 +22,20 @@ bad_usage() {
   exit 2
 }
 
+# answer_help ARGUMENT...: where one asks for help, prints standard input and leaves, before anything is installed.
+answer_help() {
+  local argument
+  for argument in "$@"; do
+    case $argument in
+    --) return 0 ;; # what follows is another command's
+    --help | -h)
+      cat
+      exit 0
+      ;;
+    esac
+  done
+}
+
 # Ctrl-C: the child got the signal too and has cleaned up by now; leave with the conventional code.
 leave_on_signals() {
   trap 'trap - INT TERM; end_beside; say ""; say "interrupted"; exit 130' INT
