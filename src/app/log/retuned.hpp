@@ -45,7 +45,7 @@ using Tapped = typename TappedType<P>::type;
 template <class P>
 typename Tapped<P>::Params tapped(typename P::Params p, bool drives) {
   // What it shakes the wheels with goes nowhere either: no encoder could answer.
-  if (!drives) p.safety.encoder_check_drive = p.safety.encoder_probe_drive = 0.0;
+  if (!drives) p.safety.encoder_check_drive = 0.0;
   return {p.robot,    p.calibration, p.estimators, p.reference, p.feedback,
           p.friction, p.motor,       p.safety,     p.attitude};
 }
