@@ -29,12 +29,13 @@ class EncoderProbe {
   /// `turning`: the drive about the vertical so far. It is pushed where it pushes, so that a robot which
   /// friction holds off its heading gets nearer to it.
   double update(bool armed, const Measurement<Wheels>& z, double turning) noexcept {
+    if (!(drive_ > 0.0)) return 0.0;
     const bool counted = !(known_ && z.encoders_ok && z.wheel_angle_rad == angle_rad_);
     known_ = armed && z.encoders_ok;
     angle_rad_ = z.wheel_angle_rad;
     dead_ = dead_ && armed;
     silent_ = armed && !counted ? std::min(silent_ + z.ticks, kTicks) : 0;
-    if (!(drive_ > 0.0) || silent_ <= kPatience) {
+    if (silent_ <= kPatience) {
       sense_ = turning < 0.0 ? -1.0 : 1.0;
       return 0.0;
     }
