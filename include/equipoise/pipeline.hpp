@@ -132,7 +132,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   /// What friction takes from the drive: of wheels that turn, and of wheels that may be held by it.
   Input friction_of(const typename Robot::Sample& z, const Input& u) noexcept {
-    constexpr int kTurn = Robot::kInputs - 1;  // about the vertical, of every robot
+    constexpr int kTurn = Robot::kInputs - 1;  // about the vertical, of robots that turn
     Input friction = kinematics_.friction_input(p_.friction, z.wheel_rate_rad_s);
     friction(kTurn) += encoder_probe_.update(safety_.armed(), z, u(kTurn));
     return friction;
