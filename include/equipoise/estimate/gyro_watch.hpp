@@ -2,10 +2,10 @@
 // expected one but for a flipped axis or two swapped ones, the gyro lies. What it saw within a few ticks must
 // be what the wheels saw: torque turns body and wheels in a known ratio, and about some axes the wheels give
 // the rate itself. It lies where that agrees with an axis flipped or two swapped and not as it is, and where
-// no single encoder explains what they disagree about. A push agrees with neither; the accelerometer feels
-// it. A bias that jumps is taken off. In: Measurement, rates expected, what the filter knows -> out: the
-// measurement without what lies, and whether the gyro is trusted. Limits: chosen on robots 1 to 8 and 300 to
-// 340 of the population. RT-safe.
+// no single encoder explains what they disagree about, and where it spins while all wheels stand still. A
+// push agrees with neither; the accelerometer feels it. A bias that jumps is taken off. In: Measurement,
+// rates expected, what the filter knows -> out: the measurement without what lies, and whether the gyro is
+// trusted. Limits: chosen on robots 1 to 8 and 300 to 340 of the population. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -72,7 +72,7 @@ class GyroWatch {
       history_.forget();
       evidence_ = 0.0;
       for (Odds& odds : swapped_) odds = Odds::Zero();
-      contradicted_ = 0;
+      contradicted_ = spins_held_ = 0;
       if (z.ticks > kStall) settling_ = kSettling;
       return;
     }
@@ -84,6 +84,10 @@ class GyroWatch {
     evidence_ = verdict.lies ? evidence_ + std::min(verdict.surprise, kMostOfATick) : 0.0;
     contradicted_ = verdict.unexplained > kContradiction ? contradicted_ + 1 : 0;
     if (contradicted_ >= kContradicted) trusted_ = false;
+    const bool held =
+        p_.max_held_slip_rad_s > 0.0 && std::abs(witness.held_slip_rad_s) > p_.max_held_slip_rad_s;
+    spins_held_ = held ? spins_held_ + 1 : 0;
+    if (spins_held_ >= kContradicted) trusted_ = false;
     const bool blames_wheel = witness.blamed_wheel >= 0;
     if (evidence_ > (blames_wheel ? kProofOfAnError : kProof)) condemn(nearest_);
     if (history_.samples() == History::kKept && calm && !witness.wheel_stands) weigh(witness);
@@ -368,6 +372,7 @@ class GyroWatch {
   bool weighs_ = false;
   int blamed_ = 0;                  // ticks since an encoder is left out
   int contradicted_ = 0;            // ticks in a row
+  int spins_held_ = 0;              // ticks in a row: turns, it says, and no wheel does
   int mirrored_ = 0;                // ticks in a row
   GyroLie nearest_ = kGyroLies[0];  // that explains most
   double accel_nis_ = 0.0;

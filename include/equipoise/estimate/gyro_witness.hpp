@@ -24,6 +24,7 @@ struct GyroWatchParams {
   std::array<bool, 3> by_rate{false, false, false};
   Mat<3, Wheels> rate_from_wheels = Mat<3, Wheels>::Zero();
   Vec3 rate_sigma_rad_s = Vec3::Constant(0.25);  // encoder counts, play
+  double max_held_slip_rad_s = 0.0;              // of the spin while all wheels stand still; zero: any
 };
 
 /// What the filter knows of the tick.
@@ -34,6 +35,7 @@ struct GyroWitness {
   Vec<Wheels> carried_rad_s2 = Vec<Wheels>::Zero();
   int blamed_wheel = -1;           // is not used any more; -1: none
   bool wheel_stands = false;       // it, since long: that is no fault of the gyro
+  double held_slip_rad_s = 0.0;    // spin of wheels that all stand still, less what the gyro says
   Vec3 rate_rad_s = Vec3::Zero();  // of the axes `by_rate`, added to what the wheels say
 };
 

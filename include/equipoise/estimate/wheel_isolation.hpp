@@ -66,7 +66,7 @@ class WheelIsolation {
     follow(mean_[Wheels], filter, -1);
     if (!running_) return;
     for (int i = 0; i < Wheels; ++i) step_without(bank_[static_cast<std::size_t>(i)], i, u, z);
-    judge(filter);
+    judge(filter, z);
     quiet_ = suspicious() ? kQuietTicks : quiet_ - 1;
     running_ = running_ && quiet_ > 0;
   }
@@ -90,6 +90,12 @@ class WheelIsolation {
   }
   /// Smoothed spin of the wheels against the gyro.
   double slip_rad_s() const noexcept { return slip_; }
+  /// The same while all wheels stand still, else zero.
+  double held_slip_rad_s() const noexcept {
+    const bool held =
+        std::abs(slip_) > kSlip_rad_s && *std::min_element(still_.begin(), still_.end()) >= kStillTicks;
+    return held ? slip_ : 0.0;
+  }
 
  private:
   static constexpr std::size_t kMeans = static_cast<std::size_t>(Wheels) + 1;  // the last: with all wheels
@@ -129,6 +135,7 @@ class WheelIsolation {
     bank_.fill(filter);
     std::fill(mean_.begin(), mean_.end() - 1, mean_[Wheels]);
     quiet_ = std::max(quiet_, kQuietTicks);
+    turning_rad_s_.setZero();
     hits_ = 0;
     running_ = true;
   }
@@ -176,7 +183,8 @@ class WheelIsolation {
     follow(mean_[static_cast<std::size_t>(wheel)], filter, wheel);
   }
 
-  void judge(Filter& filter) noexcept {
+  void judge(Filter& filter, const Sample& z) noexcept {
+    turning_rad_s_ += kMean * (z.wheel_rate_rad_s.cwiseAbs() - turning_rad_s_);
     if (ticks_ < kFirstTick) return;
     const double all = mean_[Wheels];
     int best = -1;
@@ -187,7 +195,9 @@ class WheelIsolation {
       for (auto m = mean_.begin(); m != end; ++m) second = m == least ? second : std::min(second, *m);
       if (*least < kExplains * std::min(all, second)) best = static_cast<int>(least - mean_.begin());
       const Vec<Wheels> rate = filter.wheel_rate_rad_s();
-      for (int i = 0; i < Wheels && best < 0; ++i) {
+      // Where friction holds all of them, a gyro that lies about the spin makes one look stuck.
+      const bool others_turn = turning_rad_s_.maxCoeff() > kTurning_rad_s;
+      for (int i = 0; i < Wheels && best < 0 && others_turn; ++i) {
         const auto k = static_cast<std::size_t>(i);
         const bool turning = std::abs(rate(i)) > kTurning_rad_s;
         if (still_[k] >= kStillTicks && turning && mean_[k] < kExplainsStill * all && mean_[k] == *least)
@@ -207,7 +217,8 @@ class WheelIsolation {
     }
     const auto [least, most] = std::minmax_element(mean_.begin(), mean_.begin() + Wheels);
     undecided_ = all > kLostTrack && *most < kAnyExplains * all ? undecided_ + 1 : 0;
-    if (undecided_ < kUndecided || ticks_ <= kArmingTicks) return;
+    // Without the gyro's yaw rate the robot needs all wheels to know its own.
+    if (undecided_ < kUndecided || ticks_ <= kArmingTicks || !z.gyro_axis_ok[2]) return;
     const auto stillest = std::max_element(still_.begin(), still_.end());
     const bool one_stands = *stillest >= kStillTicks;
     on_trial_ = true;
@@ -250,6 +261,7 @@ class WheelIsolation {
   std::array<double, kMeans> mean_{};
   std::array<int, static_cast<std::size_t>(Wheels)> still_{};
   std::array<double, static_cast<std::size_t>(Wheels)> slipped_still_rad_{};  // since it stands still
+  Vec<Wheels> turning_rad_s_ = Vec<Wheels>::Zero();  // of late, by the encoders, either way
   Vec<Wheels> angle_rad_ = Vec<Wheels>::Zero();
   bool known_ = false;
   double play_rad_;

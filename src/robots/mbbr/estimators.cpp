@@ -45,6 +45,7 @@ GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
   p.balances = {true, true, false};
   p.by_rate = {false, false, true};  // the ball does not spin about the vertical
   p.rate_from_wheels.row(2) = yaw_from_wheels(kinematics).transpose();
+  p.max_held_slip_rad_s = 0.4;  // sound robots 301 to 400: below 0.2
   return p;
 }
 
@@ -140,6 +141,7 @@ void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   GyroWitness<Mbbr::kWheels> witness;
   witness.blamed_wheel = isolation_.lost();
   witness.wheel_stands = isolation_.stands_still();
+  witness.held_slip_rad_s = isolation_.held_slip_rad_s();
   witness.accel_nis = ekf_.row_nis()[MbbrEkfModel::kAccel] + ekf_.row_nis()[MbbrEkfModel::kAccel + 1];
   witness.carried_rad_s2 = kinematics_.wheels_from_ball(Vec3(carried.x(), carried.y(), 0.0));
   witness.rate_rad_s.z() = spin_rad_s;

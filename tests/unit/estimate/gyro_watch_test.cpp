@@ -44,6 +44,7 @@ class Twist {
       witness.accel_nis = accel_nis;
       witness.blamed_wheel = blames_wheel ? 0 : -1;
       witness.wheel_stands = wheel_stands;
+      witness.held_slip_rad_s = held_slip_rad_s;
       watch_.compare(z, witness);
       off_rad_s = z.gyro_B_rad_s - omega;
       if (!watch_.trusted()) return i + 1;
@@ -54,6 +55,7 @@ class Twist {
   void reset() { watch_.reset(); }
   bool blames_wheel = false;
   bool wheel_stands = false;
+  double held_slip_rad_s = 0.0;
   bool counts_backwards = false;  // the wheel that is blamed
   double amplitude = 1.0;
   Vec3 u = Vec3::Zero();          // torque, as an input
@@ -154,6 +156,24 @@ TEST(GyroWatchTest, SwappedAxesThatWereTakenForAnEncoderAreTheGyroAtOnce) {
   Twist unexamined = sway(0.0);
   unexamined.blames_wheel = true;
   EXPECT_EQ(unexamined.run(swapped_yz), 0);
+}
+
+TEST(GyroWatchTest, ASpinThatNoWheelFollowsIsTheGyros) {
+  GyroWatchParams<3> p = Twist::params();
+  p.max_held_slip_rad_s = 0.4;
+  Twist robot(p);
+  ASSERT_EQ(robot.run(truth), 0);
+  robot.held_slip_rad_s = 0.39;
+  EXPECT_EQ(robot.run(truth), 0);
+  robot.held_slip_rad_s = -0.41;
+  EXPECT_EQ(robot.run(truth, 2.0, 2), 0);
+  robot.held_slip_rad_s = 0.0;
+  EXPECT_EQ(robot.run(truth, 2.0, 1), 0) << "ticks in a row";
+  robot.held_slip_rad_s = -0.41;
+  EXPECT_EQ(robot.run(truth), 3);
+  Twist two_wheels;
+  two_wheels.held_slip_rad_s = 2.0;
+  EXPECT_EQ(two_wheels.run(truth), 0) << "not where it is of no interest";
 }
 
 TEST(GyroWatchTest, AnEncoderThatCountsBackwardsIsNoSwapOfAxes) {

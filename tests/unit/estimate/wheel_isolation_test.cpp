@@ -48,6 +48,7 @@ class Isolate : public ::testing::Test {
   void tick(double slip_rad_s = 0.0, const Vec<kWheels>& step_rad = Vec<kWheels>::Constant(0.01)) {
     z_.imu_ok = z_.encoders_ok = true;
     z_.wheel_angle_rad += step_rad;
+    z_.wheel_rate_rad_s = step_rad / kTickS;
     isolation_.step(filter_, 0.5, z_, [&](const Vec<kWheels>& rates) {
       rates_ = rates;
       return slip_rad_s;
@@ -221,6 +222,28 @@ TEST_F(Isolate, AWheelThatStandsStillBecauseTheRobotDoesIsNone) {
   world_.noise = 2.5;
   world_.rate_rad_s = 1.4;
   EXPECT_EQ(ticks_to_find(300, 1.0, Vec<kWheels>(0.01, 0.0, 0.01)), 0);
+}
+
+TEST_F(Isolate, AWheelStandsStillAsTheOthersDo) {
+  lies(1);
+  world_.lie = 4.0;
+  world_.noise = 2.5;
+  world_.rate_rad_s = 2.0;
+  EXPECT_EQ(ticks_to_find(300, 1.0, Vec<kWheels>(0.007, 0.0, 0.007)), 0) << "1.4 rad/s";
+  EXPECT_NE(ticks_to_find(60, 1.0, Vec<kWheels>(0.008, 0.0, 0.0)), 0);
+  EXPECT_EQ(isolation_.lost(), 1);
+}
+
+TEST_F(Isolate, SlipOfWheelsThatAllStandStillIsHeldSlip) {
+  settle();
+  for (int i = 0; i < 60; ++i) tick(-1.0, Vec<kWheels>(0.0, 0.0, 0.01));
+  EXPECT_EQ(isolation_.held_slip_rad_s(), 0.0) << "one turns";
+  for (int i = 0; i < 5; ++i) tick(-1.0, Vec<kWheels>::Zero());
+  EXPECT_EQ(isolation_.held_slip_rad_s(), 0.0) << "they stand for 5 ticks";
+  tick(-1.0, Vec<kWheels>::Zero());
+  EXPECT_NEAR(isolation_.held_slip_rad_s(), -1.0, 1e-3);
+  for (int i = 0; i < 60; ++i) tick(0.29, Vec<kWheels>::Zero());
+  EXPECT_EQ(isolation_.held_slip_rad_s(), 0.0) << "hardly any";
 }
 
 TEST_F(Isolate, SlipIsSmoothedOverAboutSevenTicks) {

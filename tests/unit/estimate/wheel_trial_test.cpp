@@ -108,6 +108,15 @@ TEST_F(Trial, NotWhereAWheelDoesNotExplainIt) {
   EXPECT_EQ(isolation_.lost(), 0);
 }
 
+TEST_F(Trial, NotWithoutTheGyrosYawRate) {
+  z_.gyro_axis_ok[2] = false;
+  lose_track({0.3, 0.5});
+  EXPECT_EQ(isolation_.lost(), -1) << "the wheels give it";
+  z_.gyro_axis_ok = {false, false, true};
+  run(1);
+  EXPECT_EQ(isolation_.lost(), 0);
+}
+
 TEST_F(Trial, NotWhileArming) {
   surprises_ = {40.0, {0.3, 0.5}};
   run(100);
