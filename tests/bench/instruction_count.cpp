@@ -2,6 +2,7 @@
 // usage: instruction_count ROBOT CONFIG PART TIMES
 //   run      ticks of the simulated robot and the pipeline, armed after 100, turning at 1 Hz
 //   ticks    the same, and the recorded samples once more through a fresh pipeline
+//   filters  the same; says how often the default filter ran, with the bank that looks for a lying encoder
 //   plant-F  ticks of the simulated robot alone, F: its fidelity; it starts anew before it has fallen
 //   packed   steps of the default filter as it runs
 //   dense    the same steps of the same model in KalmanFilter, Eigen
@@ -60,7 +61,7 @@ struct WorldIo {
 };
 
 template <class Firmware>
-void ticks(const std::string& file, int times, bool again) {
+void ticks(const std::string& file, int times, const std::string& part) {
   Choice choice;
   choice.estimator = Firmware::kDefaultEstimator;
   choice.controller = Firmware::kDefaultController;
@@ -77,10 +78,17 @@ void ticks(const std::string& file, int times, bool again) {
     (void)runtime::run_loop(io, pipeline, commands, nobody, never);
     if (io.motors.enable == 0) throw ConfigError(file + ": the robot is not balancing at the end of the run");
   });
-  if (!again) return;
+  if (part == "run") return;
+  long filters = 0;
   Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    (void)runtime::run_loop(recording, pipeline, commands, nobody, never);
+    const auto count = [&](auto&&...) { filters += pipeline.estimators().filters(); };
+    if (part == "filters") {
+      (void)runtime::run_loop(recording, pipeline, commands, count, never);
+    } else {
+      (void)runtime::run_loop(recording, pipeline, commands, nobody, never);
+    }
   });
+  if (part == "filters") std::fprintf(stderr, "filters %ld\n", filters);
 }
 
 template <class Firmware>
@@ -177,11 +185,12 @@ void bridges(const std::string& how, int times) {
 
 template <class Firmware>
 void count(const std::string& file, const std::string& part, int times) {
-  if (part == "run" || part == "ticks") return ticks<Firmware>(file, times, part == "ticks");
+  if (part == "run" || part == "ticks" || part == "filters") return ticks<Firmware>(file, times, part);
   if (part.rfind("plant-", 0) == 0) return plant<Firmware>(file, part.substr(6), times);
   if (part == "packed" || part == "dense") return filter(file, part, times, Firmware{});
   if (part == "bridge" || part == "newton") return bridges(part, times);
-  throw std::runtime_error(part + ": no part; run, ticks, plant-FIDELITY, packed, dense, bridge or newton");
+  throw std::runtime_error(part +
+                           ": no part; run, ticks, filters, plant-FIDELITY, packed, dense, bridge or newton");
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .count_instructions import ROBOTS
+from .count_page import ROBOTS
 from .entry import leave
 from .paths import UserError, repository_root
 

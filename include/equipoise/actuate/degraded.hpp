@@ -53,8 +53,8 @@ inline constexpr std::array<DegradedMode, 9> kDegradedModes{{
 /// Calls `with(mode)` for every bit that is set.
 template <class With>
 void for_each_degraded(std::uint32_t degraded, With&& with) {
-  for (std::size_t i = 0; i < kDegradedModes.size(); ++i) {
-    if ((degraded & (1u << i)) != 0) with(kDegradedModes[i]);
+  for (std::size_t i = 0; i < kDegradedModes.size() && degraded >> i != 0; ++i) {
+    if ((degraded >> i & 1u) != 0) with(kDegradedModes[i]);
   }
 }
 

@@ -40,7 +40,7 @@ class DeadEncoders {
       for (int b = a + 1; b < Wheels; ++b, ++at) {
         Pair& pair = pairs_[at];
         if (!known || moved(a) != 0.0 || moved(b) != 0.0) {
-          pair = Pair{};
+          if (pair.ticks > 0) pair = Pair{};
           continue;
         }
         for (std::size_t i = 0; i < 3 && z.imu_ok; ++i) {

@@ -20,8 +20,8 @@ class GyroHistory {
 
   /// The latest ticks, and what changed since as many before.
   struct Span {
-    Vec3 mean_rad_s = Vec3::Zero();
-    Vec3 change_rad_s = Vec3::Zero();
+    Vec3 mean_rad_s;
+    Vec3 change_rad_s;
     Vec<Wheels> turned_rad;
     Vec<Wheels> turned_more_rad;
   };
@@ -40,21 +40,24 @@ class GyroHistory {
 
   const Vec3& gyro_rad_s() const noexcept { return gyro_[latest_]; }
 
-  /// `half`: a multiple of kSum; asks for span(half) samples.
-  Span latest(std::size_t half) const noexcept {
+  /// Asks for span(Ticks) samples; Ticks: a multiple of kSum.
+  template <std::size_t Ticks>
+  Span latest() const noexcept {
+    static_assert(Ticks % kSum == 0 && Ticks <= Half);
     const Vec3* const gyro = &gyro_sum_[latest_];
     const Vec<Wheels>* const angle = &angle_[latest_];
-    const double share = 1.0 / static_cast<double>(half);
-    Span s;
-    Vec3 before = Vec3::Zero();
-    for (std::size_t i = 0; i < half; i += kSum) {
-      s.mean_rad_s += gyro[i];
-      before += gyro[half + i];
+    constexpr double share = 1.0 / static_cast<double>(Ticks);
+    Vec3 sum = gyro[0];
+    Vec3 before = gyro[Ticks];
+    for (std::size_t i = kSum; i < Ticks; i += kSum) {
+      sum += gyro[i];
+      before += gyro[Ticks + i];
     }
-    s.mean_rad_s *= share;
-    s.change_rad_s = s.mean_rad_s - share * before;
-    s.turned_rad = angle[0] - angle[half];
-    s.turned_more_rad = angle[0] - 2.0 * angle[half] + angle[2 * half];
+    Span s;
+    s.mean_rad_s = share * sum;
+    s.change_rad_s = share * (sum - before);
+    s.turned_rad = angle[0] - angle[Ticks];
+    s.turned_more_rad = angle[0] - 2.0 * angle[Ticks] + angle[2 * Ticks];
     return s;
   }
 

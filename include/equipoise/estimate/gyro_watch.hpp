@@ -203,20 +203,23 @@ class GyroWatch {
 
   /// Of the latest ticks, and what changed since as many before.
   struct Seen {
-    Vec3 mean = Vec3::Zero();  // by the gyro
-    Vec3 change = Vec3::Zero();
-    Vec3 by_wheels = Vec3::Zero();  // change
-    Vec3 rate = Vec3::Zero();       // by the wheels
+    Vec3 mean;  // by the gyro
+    Vec3 change;
+    Vec3 by_wheels;  // change
+    Vec3 rate;       // by the wheels
   };
 
-  Seen seen(std::size_t half, const GyroWitness<Wheels>& witness) const noexcept {
-    const auto span = history_.latest(half);
-    const double half_s = static_cast<double>(half) * kTickS;
+  template <std::size_t Ticks>
+  Seen seen(const GyroWitness<Wheels>& witness) const noexcept {
+    const auto span = history_.template latest<Ticks>();
+    constexpr double half_s = static_cast<double>(Ticks) * kTickS;
     Seen s;
     s.mean = span.mean_rad_s;
     s.change = span.change_rad_s;
-    s.by_wheels = p_.from_wheels * (span.turned_more_rad / half_s - half_s * witness.carried_rad_s2);
-    s.rate = p_.rate_from_wheels * (span.turned_rad / half_s).eval() + witness.rate_rad_s;
+    s.by_wheels =
+        p_.from_wheels * (1.0 / half_s * span.turned_more_rad - half_s * witness.carried_rad_s2).eval();
+    s.rate = witness.rate_rad_s;
+    s.rate.z() += 1.0 / half_s * p_.yaw_from_wheels.dot(span.turned_rad);
     return s;
   }
 
@@ -304,7 +307,7 @@ class GyroWatch {
   /// the wrong sensors hardly turns its wheels later.
   void weigh(const GyroWitness<Wheels>& witness) noexcept {
     if (p_.slow_sigma_rad_s.isZero(0.0) || !examined_[0] || !examined_[1] || !examined_[2]) return;
-    const Seen s = seen(kSlowHalf, witness);
+    const Seen s = seen<kSlowHalf>(witness);
     const double as_is = misfit(s.change, s.mean, s, p_.slow_sigma_rad_s);
     if (as_is <= kDoubt && !weighs_) return;  // nor would it be more with what follows
     Odds lies;
@@ -330,7 +333,7 @@ class GyroWatch {
   };
 
   Verdict judge(const GyroWitness<Wheels>& witness) noexcept {
-    const Seen s = seen(kHalf, witness);
+    const Seen s = seen<kHalf>(witness);
     const double as_is = misfit(s.change, s.mean, s, p_.sigma_rad_s);
     Verdict verdict;
     if (!(as_is > kSurprise)) return verdict;
@@ -345,7 +348,7 @@ class GyroWatch {
     Vec3 left = (s.change - s.by_wheels).cwiseQuotient(p_.sigma_rad_s);
     for (std::size_t i = 0; i < 3; ++i) {
       const auto axis = static_cast<int>(i);
-      if (p_.by_rate[i] && p_.rate_from_wheels.row(axis).isZero(0.0))  // no wheel turns about it
+      if (p_.by_rate[i] && i != 2)  // no wheel turns about it
         left(axis) = (s.mean(axis) - s.rate(axis)) / p_.rate_sigma_rad_s(axis);
       if (!examined_[i]) left(axis) = 0.0;
     }

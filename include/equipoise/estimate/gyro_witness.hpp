@@ -19,10 +19,9 @@ struct GyroWatchParams {
   Vec3 per_jump = Vec3::Zero();  // 1 over the least jump of the bias that is examined; zero: of no interest
   double of_an_encoder = 1.0;    // a lie leaves less than so much of what is left with another encoder
   std::array<bool, 3> balances{true, true, true};  // axes without which the robot falls
-  // Axes whose rate is known without a torque: `rate_from_wheels` times the wheels' rates and what the filter
-  // adds.
+  // Axes whose rate is known without a torque: by what the filter knows, and about z by the wheels' rates.
   std::array<bool, 3> by_rate{false, false, false};
-  Mat<3, Wheels> rate_from_wheels = Mat<3, Wheels>::Zero();
+  Vec<Wheels> yaw_from_wheels = Vec<Wheels>::Zero();
   Vec3 rate_sigma_rad_s = Vec3::Constant(0.25);  // encoder counts, play
   double max_held_slip_rad_s = 0.0;              // of the spin while all wheels stand still; zero: any
 };

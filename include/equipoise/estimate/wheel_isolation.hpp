@@ -83,6 +83,11 @@ class WheelIsolation {
   bool while_arming() const noexcept { return lost_ >= 0 && lost_at_ <= kArmingTicks; }
   /// Just armed: a lying encoder surprises the estimator before it can be named.
   bool checking() const noexcept { return ticks_ <= kTrialTicks && lost_ < 0; }
+  /// Filters that the next step will run, unless suspicion begins or ends with it.
+  int filters() const noexcept {
+    if (lost_ >= 0) return on_trial_ ? Wheels : 1;
+    return running_ ? 1 + Wheels : 1;
+  }
   /// An encoder explains what surprises the filter: what it learns meanwhile is not to be judged.
   bool suspects() const noexcept {
     return running_ && mean_[Wheels] > kSurprised &&

@@ -44,7 +44,7 @@ GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
   p.per_jump = {4.5, 4.5, 0.0};                                     // 0.22 rad/s; more than sound robots show
   p.balances = {true, true, false};
   p.by_rate = {false, false, true};  // the ball does not spin about the vertical
-  p.rate_from_wheels.row(2) = yaw_from_wheels(kinematics).transpose();
+  p.yaw_from_wheels = yaw_from_wheels(kinematics);
   p.max_held_slip_rad_s = 0.4;  // sound robots 301 to 400: below 0.2
   return p;
 }

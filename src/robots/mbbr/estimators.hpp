@@ -61,6 +61,8 @@ class MbbrEstimators {
   EstimatorHealth<Mbbr::kWheels> health() const noexcept;
   /// It finds a lying encoder by itself.
   bool isolates() const noexcept { return params_.active == Id::kEkf; }
+  /// Default filters that run: one, and the bank that looks for a lying encoder; see wheel_isolation.hpp.
+  int filters() const noexcept { return isolation_.filters(); }
   bool reads_attitude() const noexcept { return runs(Id::kKfAttitude); }
 
  private:

@@ -28,7 +28,7 @@ GyroWatchParams<2> gyro_watch(const MipEstimatorParams& params) {
   p.balances = {true, false, false};
   p.by_rate = {false, true, true};  // y sees the yaw of a leaning robot, tyres do not slip
   p.rate_sigma_rad_s = {0.0, 0.06, 0.25};
-  for (int i = 0; i < 2; ++i) p.rate_from_wheels(2, i) = kinematics.psi(Vec2(Vec2::Unit(i)));
+  for (int i = 0; i < 2; ++i) p.yaw_from_wheels(i) = kinematics.psi(Vec2(Vec2::Unit(i)));
   return p;
 }
 

@@ -78,7 +78,7 @@ TEST(GyroHistoryTest, GivesMeansChangesAndTurnsOfTheLatestTicks) {
         mean += gyro[k] / static_cast<double>(half);
         before += gyro[half + k] / static_cast<double>(half);
       }
-      const History::Span span = history.latest(half);
+      const History::Span span = half == 3 ? history.latest<3>() : history.latest<6>();
       EXPECT_LT((span.mean_rad_s - mean).norm(), 1e-9);
       EXPECT_LT((span.change_rad_s - (mean - before)).norm(), 1e-9);
       EXPECT_LT((span.turned_rad - (angle[0] - angle[half])).norm(), 1e-9);
@@ -102,7 +102,7 @@ class KnownRates {
     GyroWatchParams<2> p;
     p.by_rate = {true, false, true};
     p.from_wheels.row(2) << 0.5, -0.5;
-    p.rate_from_wheels.row(2) << 0.5, -0.5;
+    p.yaw_from_wheels << 0.5, -0.5;
     return p;
   }
 

@@ -1,0 +1,164 @@
+"""What tools/count_instructions writes: docs/performance.md with its picture, and the committed counts."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+ROBOTS = {"mbbr": "config/mbbr.toml", "mip": "config/edumip.toml"}
+TICK_HZ = 200
+CLOCK_HZ = 1e9
+TABLE = Path("tests/data/instructions.json")
+PAGE = Path("docs/performance.md")
+MOST_LOAD = 0.08  # of 1 GHz, of the whole firmware
+# Where a line of the tick belongs: by its file, or, of a call in the tick itself, by the function.
+STAGES = {
+    "sense": r"/sense/|Senses|attitude_filter",
+    "estimate": r"/estimate/|stimators|/ekf\.",
+    "reference": r"reference\.[ch]|Reference",
+    "control": r"/control/|eedback|friction",
+    "bridge": r"bridge|drive_coast|DriveCoast|Bridge|within_supply|allocate",
+    "safety": r"safety|Safety|encoder_check|EncoderCheck",
+}
+
+
+def table(counts: dict) -> list[str]:
+    machines = [
+        (name, counts[key]) for key, name in (("x86", "x86-64"), ("cortex_a8", "Cortex-A8")) if counts[key]
+    ]
+    columns = [(f"{name}, {robot}", m[robot]) for name, m in machines for robot in ROBOTS]
+    lines = ["| instructions per tick | " + " | ".join(name for name, _ in columns) + " |"]
+    lines += ["|---" * (len(columns) + 1) + "|"]
+    rows = [
+        ("tick", "tick"),
+        ("filters that ran in it", "filters"),
+        ("the default filter", "filter"),
+        ("the same filter, dense Eigen", "dense_filter"),
+        ("tick with dense filters", "dense_tick"),
+        ("tick over that", "ratio"),
+        ("tick without the bank", "tick_of_one_filter"),
+        ("log of a tick, another thread", "log"),
+        ("simulated tick: plant, sensors, tick", "simulated_tick"),
+    ]
+    for label, key in rows:
+        cells = ["" if c[key] is None else f"{c[key]:,}" for _, c in columns]
+        lines.append(f"| {label} | " + " | ".join(cells) + " |")
+    for stage in [*STAGES, "rest"]:
+        cells = [f"{c['stages'][stage]:,}" if c["stages"] else "" for _, c in columns]
+        lines.append(f"| stage: {stage} | " + " | ".join(cells) + " |")
+    lines += ["", "| instructions per inversion of the bridge | " + " | ".join(n for n, _ in machines) + " |"]
+    lines += ["|---" * (len(machines) + 1) + "|"]
+    for label, key in (
+        ("ours", "inversion"),
+        ("Newton from the printed start", "newton"),
+        ("ratio", "ratio"),
+    ):
+        lines.append(f"| {label} | " + " | ".join(f"{m['bridge'][key]:,}" for _, m in machines) + " |")
+    return lines
+
+
+def a8_load(robots: dict) -> list[str]:
+    """What the Cortex-A8's counts mean for its load."""
+    cycles = ", ".join(f"{robots[r]['tick_cycles']:,} ({r})" for r in ROBOTS)
+    filters = ", ".join(f"{robots[r]['filter_cycles']:,} ({r})" for r in ROBOTS)
+    load = ", ".join(f"{robots[r]['tick_cycles'] * TICK_HZ / CLOCK_HZ:.1%} ({r})" for r in ROBOTS)
+    return [
+        "",
+        f"A Cortex-A8 needs about {cycles} cycles for a tick, of them {filters} for the filter; that is "
+        f"{load} of 1 GHz at 200 Hz. VFPLite is not pipelined, so that the cycles of its instructions "
+        "add up: the upper ends of the ranges for doubles in ARM DDI 0344, Table 16.25 (addition 10, "
+        "multiplication 17, division 65). Assumed: a square root 65, other VFP arithmetic 17, 20 for a "
+        "comparison's result to reach the integer side, 1 for any other instruction. Computed, not measured "
+        "on a board; waiting for memory, devices, kernel, telemetry and log are not in it.",
+    ]
+
+
+def whole_load(firmware: dict, robots: dict) -> dict[str, dict[int, float]]:
+    """Of 1 GHz, by the cycles that an instruction is taken to need that is none of the tick's arithmetic."""
+    load: dict[str, dict[int, float]] = {}
+    for robot in ROBOTS:
+        arithmetic = robots[robot]["tick_cycles"] - robots[robot]["tick"]
+        instructions = sum(firmware[robot].values())
+        load[robot] = {n: (n * instructions + arithmetic) * TICK_HZ / CLOCK_HZ for n in (1, 2)}
+    return load
+
+
+def firmware_table(firmware: dict, robots: dict | None) -> list[str]:
+    lines = [
+        "",
+        "## The whole firmware",
+        "| instructions per tick, emulated robot | mbbr | mip |",
+        "|---|---|---|",
+    ]
+    rows = [
+        ("loop: drivers, tick, hand-over", "loop"),
+        ("log and telemetry", "threads"),
+        ("guard", "guard"),
+        ("kernel beside them: interrupts, timers, its own threads", "kernel"),
+    ]
+    for label, key in rows:
+        lines.append(f"| {label} | " + " | ".join(f"{firmware[r][key]:,}" for r in ROBOTS) + " |")
+    lines.append("| sum | " + " | ".join(f"{sum(firmware[r].values()):,}" for r in ROBOTS) + " |")
+    if robots is not None:
+        load = whole_load(firmware, robots)
+        for n in (1, 2):
+            cells = " | ".join(f"{load[r][n]:.1%}" for r in ROBOTS)
+            lines.append(
+                f"| load of 1 GHz, {n} cycle{'s' if n > 1 else ''} each and the tick's VFP | {cells} |"
+            )
+    return [
+        *lines,
+        "",
+        "Counted by `./tools/vm-test load`: `equipoise run` with guard, log and telemetry balances a "
+        "simulated robot through a PREEMPT_RT kernel for 20 s; the machine's clock counts instructions, so "
+        "that the kernel's account of who ran how long is their number. System calls are in the row of who "
+        "made them. Not in it: what the simulated robot takes, and what the kernel takes for it while no "
+        "firmware runs. To the sum are added the cycles beyond one per instruction that the tick's "
+        f"arithmetic takes, from above. Aimed at: {MOST_LOAD:.0%}. Assumed: one cycle for every other "
+        "instruction; the last row assumes two, and a board decides between them, as waiting for memory is "
+        "not counted. The emulated machine's I2C, GPIO, PWM and counters are simple drivers "
+        "(tests/hardware/kernel, gpio-sim); those of the AM335x take more, I2C an interrupt every few bytes. "
+        "The log goes to memory, not to an SD card.",
+    ]
+
+
+def write_page(root: Path, counts: dict) -> None:
+    from .style import plt  # only this needs Matplotlib
+
+    robots = list(ROBOTS)
+    figure, axes = plt.subplots(figsize=(7, 2.8))
+    stages = [*STAGES, "rest"]
+    left = [0.0] * len(robots)
+    for stage in stages:
+        width = [counts["x86"][r]["stages"][stage] for r in robots]
+        axes.barh(robots, width, left=left, label=stage)
+        left = [a + b for a, b in zip(left, width, strict=True)]
+    axes.set_xlabel("instructions of an armed tick, x86-64")
+    axes.legend(ncols=4, fontsize="small", loc="upper center", bbox_to_anchor=(0.5, 1.3))
+    figure.tight_layout()
+    figure.savefig(root / "docs/images/tick-stages.svg", metadata={"Date": None})
+    plt.close(figure)
+    text = [
+        "# Instructions of a tick",
+        "Written by `./tools/count_instructions --write`: counted, not timed, so that the numbers do not "
+        "depend on the load of the machine. x86-64 by callgrind; Cortex-A8 by a plugin of qemu-arm. An armed "
+        "tick of the robot as built (world `full`) that turns at 1 Hz; the dense filter is the same model in "
+        "`KalmanFilter`, fixed-size Eigen, in the same binary. While an encoder is under suspicion a bank of "
+        "filters runs beside the first one (wheel_isolation.hpp): how many ran in a tick is counted, too, "
+        "and each is a dense one in the dense tick. tools/test fails when a count on x86 grows by more than "
+        "3 %, tools/cross-test when one on the Cortex-A8 does.",
+        "",
+        *table(counts),
+        "",
+        "![Stages of a tick](images/tick-stages.svg)",
+    ]
+    if counts["cortex_a8"] is not None:
+        text += a8_load(counts["cortex_a8"])
+    else:
+        text += ["", f"Cortex-A8: not counted ({counts['cortex_a8_missing']})."]
+    if counts["firmware"] is not None:
+        text += firmware_table(counts["firmware"], counts["cortex_a8"])
+    else:
+        text += ["", "The whole firmware: not counted; run `./tools/vm-test load` before."]
+    (root / PAGE).write_text("\n".join(text) + "\n", encoding="utf-8")
+    (root / TABLE).write_text(json.dumps(counts, indent=1) + "\n", encoding="utf-8")
