@@ -60,7 +60,7 @@ def test_a_tick_costs_no_more_than_committed(root, committed, robot):
     machine = count.Callgrind(root)
     if shutil.which("valgrind") is None or not machine.program.is_file():
         pytest.skip("needs valgrind and the host build")
-    parts = ("tick_of_one_filter", "filter", "log", "simulated_tick")
+    parts = ("tick", "filter", "log", "simulated_tick")
     assert (
         grown(machine, robot, committed["x86"], *parts) == {}
     ), "if it has to be: tools/count_instructions --write"

@@ -95,7 +95,7 @@ class WheelIsolation {
   }
   /// Smoothed spin of the wheels against the gyro.
   double slip_rad_s() const noexcept { return slip_; }
-  /// The same while all wheels stand still, else zero.
+  /// The same, where it is more than an encoder's error and all wheels stand still; else zero.
   double held_slip_rad_s() const noexcept {
     const bool held =
         std::abs(slip_) > kSlip_rad_s && *std::min_element(still_.begin(), still_.end()) >= kStillTicks;
