@@ -14,7 +14,8 @@ TEST(StandardNormal, GivesTheNumbersOfLibstdcxx) {
     std::mt19937_64 ours(seed), theirs(seed);
     StandardNormal normal;
     std::normal_distribution<double> reference;
-    for (int i = 0; i < 300000; ++i) ASSERT_EQ(normal(ours), reference(theirs)) << "seed " << seed << ", " << i;
+    for (int i = 0; i < 300000; ++i)
+      ASSERT_EQ(normal(ours), reference(theirs)) << "seed " << seed << ", " << i;
   }
 }
 
