@@ -201,6 +201,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.all_finite = in.all_finite && t.u_friction.allFinite();
     in.bridges_gaps = health_.predicts_wheels;
     in.imu_trusted = health_.gyro_trusted && !t.z.accel_frozen;
+    in.gyro_bias_known = health_.gyro_bias_known;
     in.inhibit = inhibit;
     return in;
   }

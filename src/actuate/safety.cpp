@@ -89,7 +89,8 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   std::uint32_t reasons = 0;
   if (!(tilt <= (armed() ? p_.max_tilt_rad : p_.max_arm_tilt_rad))) reasons |= kTilt;
   if (armed() && !(falls.norm() <= p_.max_fall_rad)) reasons |= kTilt;
-  if (!armed() && !(in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s)) reasons |= kGyroMoving;
+  const bool still = in.gyro_bias_known && in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s;
+  if (!armed() && !still) reasons |= kGyroMoving;
   if (unhealthy_ || !(in.tilt_sigma_rad <= p_.max_tilt_sigma_rad)) reasons |= kEstimatorUnhealthy;
   if (std::abs(slip_) > p_.max_slip_rad_s) reasons |= kWheelSlip;
   if (fast_ >= kFastTicks || falling_ >= kFallingTicks) reasons |= kPickedUp;

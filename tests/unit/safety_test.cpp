@@ -192,6 +192,7 @@ TEST(Safety, RefusesToArmAndSaysWhy) {
   EXPECT_EQ(refused([](SafetyInputs& in) { in.arm_requested = false; }), kNotRequested);
   EXPECT_EQ(refused([](SafetyInputs& in) { in.state.theta_rad.x() = 0.21; }), kTilt);
   EXPECT_EQ(refused([](SafetyInputs& in) { in.state.omega_B_rad_s.z() = 2.1; }), kGyroMoving);
+  EXPECT_EQ(refused([](SafetyInputs& in) { in.gyro_bias_known = false; }), kGyroMoving);
   EXPECT_EQ(refused([](SafetyInputs& in) { in.imu_ok = false; }), kImuStale);
   EXPECT_EQ(refused([](SafetyInputs& in) { in.encoders_ok = false; }), kEncoderStale);
   EXPECT_EQ(refused([](SafetyInputs& in) { in.command_age_s = 0.6; }), kCommandStale);

@@ -69,6 +69,7 @@ struct SafetyInputs {
   int ticks = 1;              // since the last tick, by the loop's clock
   bool bridges_gaps = false;  // the estimator's model can do without samples for a while
   bool imu_trusted = true;
+  bool gyro_bias_known = true;  // the robot has been at rest
   bool encoders_ok = false;
   bool encoder_jump = false;  // more often than may be
   bool battery_ok = false;

@@ -21,6 +21,7 @@ struct EstimatorHealth {
   bool gyro_left_out = false;     // an axis of it
   bool gyro_bias_jumped = false;  // and is taken off since
   bool gyro_trusted = true;
+  bool gyro_bias_known = true;   // found at rest, before arming
   bool predicts_wheels = false;  // `wheel_rate_rad_s` may stand in for an encoder
   Vec<Wheels> wheel_rate_rad_s = Vec<Wheels>::Zero();
 };

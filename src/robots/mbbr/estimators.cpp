@@ -106,6 +106,7 @@ EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
   EstimatorHealth<Mbbr::kWheels> h;
   if (params_.active != Id::kEkf) return h;
   report(isolation_, &h);
+  h.gyro_bias_known = rest_bias_.known();
   h.dead = dead_encoders_.dead();
   h.bias_drift_rad_s = bias_drift_.distance();
   h.disturbance = ekf_.x().segment<3>(MbbrEkfModel::kDisturbance).norm();

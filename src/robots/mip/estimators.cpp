@@ -197,6 +197,7 @@ EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
   EstimatorHealth<Mip::kWheels> h;
   if (params_.active != Id::kEkf) return h;
   report(isolation_, &h);
+  h.gyro_bias_known = rest_bias_.known();
   h.dead = dead_encoders_.dead();
   h.bias_drift_rad_s = isolation_.suspects() ? 0.0 : bias_drift_.distance();
   h.disturbance = ekf_.x().segment<2>(MipEkfModel::kDisturbance).norm();

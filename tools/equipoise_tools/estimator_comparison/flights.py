@@ -13,7 +13,13 @@ import numpy as np
 from .model import DT, ROWS, Model, N, Robot, robot_of
 
 SETTLED_S = 5.0  # errors count from here, as everywhere
-REST_RAD_S, REST_TICKS, REST_ENOUGH = 0.05, 400, 50  # rest_bias.hpp
+REST_BLOCK, REST_TICKS, REST_TURNS, REST_SIGMAS, REST_LARGEST = (
+    25,
+    400,
+    0.02,
+    4.0,
+    np.radians(11.0),
+)  # rest_bias.hpp
 STILL = 6  # freshness.hpp: an axis that repeats its count so often is left out
 
 
@@ -88,13 +94,19 @@ def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, s
 def rest_bias(gyro: np.ndarray) -> np.ndarray:
     """Mean over the last stretch of rest."""
     mean, bias, samples = np.zeros(3), np.zeros(3), 0
-    for rate in gyro:
-        if not np.linalg.norm(rate) < REST_RAD_S:
-            mean, samples = np.zeros(3), 0
-            continue
-        samples = min(samples + 1, REST_TICKS)
-        mean = mean + (rate - mean) / samples
-        if samples >= REST_ENOUGH:
+    for start in range(0, len(gyro) - REST_BLOCK + 1, REST_BLOCK):
+        block = gyro[start : start + REST_BLOCK]
+        here = block.mean(0)
+        noise = np.sqrt((np.diff(block, axis=0) ** 2).sum(0) / (2 * (REST_BLOCK - 1)))
+        tolerance = REST_TURNS + REST_SIGMAS * np.sqrt(2 / REST_BLOCK) * noise
+        same = samples > 0 and bool((abs(here - mean) < tolerance).all())
+        samples = min(samples + REST_BLOCK, REST_TICKS) if same else REST_BLOCK
+        if not (abs(here) - tolerance < REST_LARGEST).all():
+            samples = 0
+        if samples <= REST_BLOCK:
+            mean = here
+        else:
+            mean = mean + (here - mean) * REST_BLOCK / samples
             bias = mean
     return bias
 
