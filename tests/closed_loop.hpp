@@ -5,7 +5,7 @@
 #include <string>
 
 #include "app/io/plant_backend.hpp"
-#include "app/run/firmware.hpp"
+#include "app/trial/firmware.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "support/config_files.hpp"
 #include "support/stepped_io.hpp"

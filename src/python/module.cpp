@@ -11,8 +11,8 @@
 #include <chrono>
 #include <exception>
 
-#include "app/cli/errors.hpp"
 #include "app/design/analysis.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/config.hpp"
 #include "python/episodes.hpp"
 

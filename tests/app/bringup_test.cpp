@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "app/board/board_edit.hpp"
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
+#include "app/commission/board_edit.hpp"
 #include "app/commission/simulated_stand.hpp"
 #include "app/io/mock.hpp"
 #include "equipoise/config.hpp"

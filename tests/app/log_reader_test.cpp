@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "app/cli/errors.hpp"
 #include "app/log/run_log.hpp"
+#include "app/text/errors.hpp"
 #include "support/log_folder.hpp"
 
 namespace equipoise::app {

@@ -1,4 +1,4 @@
-#include "app/run/path.hpp"
+#include "app/trial/path.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -7,11 +7,11 @@
 #include <chrono>
 #include <filesystem>
 
-#include "app/cli/errors.hpp"
 #include "app/remote/event_device.hpp"
 #include "app/remote/frame_device.hpp"
 #include "app/remote/frame_learning.hpp"
 #include "app/remote/hand_remote.hpp"
+#include "app/text/errors.hpp"
 #include "config/toml_reader.hpp"
 
 namespace equipoise::app {

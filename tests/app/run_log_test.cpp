@@ -8,7 +8,7 @@
 #include <regex>
 #include <sstream>
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/runtime/wire.hpp"
 
 namespace equipoise::app {

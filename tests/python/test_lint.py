@@ -182,6 +182,21 @@ def test_law_lets_only_the_loop_call_a_tick(tmp_path):
     }
 
 
+def test_law_keeps_modules_of_the_application_free_of_cycles(tmp_path):
+    tree = planted(
+        tmp_path,
+        src__app__run__run_cpp='#include "app/trial/path.hpp"\n',
+        src__app__trial__path_cpp='#include "app/io/world.hpp"\n#include "app/text/json.hpp"\n',
+        src__app__io__world_cpp='#include "app/text/json.hpp"\n#include "app/run/run.hpp"\n',
+        src__app__log__log_cpp='#include "app/run/run.hpp"\n',
+    )
+    assert {(f.path, f.line) for f in law.law(tree)} == {
+        ("src/app/run/run.cpp", 1),
+        ("src/app/trial/path.cpp", 1),
+        ("src/app/io/world.cpp", 2),
+    }
+
+
 @pytest.mark.parametrize(
     "text",
     # Put together here, so that this file does not hold what it forbids.

@@ -10,7 +10,7 @@
 #include <iterator>
 #include <optional>
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 #include "replay/recorded_run.hpp"
 

@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "app/cli/reasons.hpp"
 #include "app/evaluate/parallel.hpp"
+#include "app/text/reasons.hpp"
 #include "support/trial.hpp"
 
 namespace equipoise {

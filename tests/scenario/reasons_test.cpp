@@ -1,7 +1,7 @@
 // Every reason against the motors is raised by production code: loop, supervisor, safety and what feeds them.
 // A case breaks something in the world, at the hardware boundary or around the loop; none sets a bit or an
 // age.
-#include "app/cli/reasons.hpp"
+#include "app/text/reasons.hpp"
 
 #include <gtest/gtest.h>
 

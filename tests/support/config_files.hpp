@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "app/run/firmware.hpp"
+#include "app/trial/firmware.hpp"
 
 namespace equipoise {
 

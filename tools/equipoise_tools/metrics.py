@@ -12,7 +12,7 @@ from . import names
 # Errors count from 5 s on, as in `equipoise sim --json`; less half a tick, for time stamps are rounded.
 SETTLE_S = 5.0 - 0.0025
 FALLEN_RAD = 0.6  # the safety gate's default tilt limit
-# The verdict's words and limits are those of src/app/run/verdict.cpp.
+# The verdict's words and limits are those of src/app/trial/verdict.cpp.
 SURELY_FALLING_RAD = 0.9 * FALLEN_RAD
 PATIENCE_S = 0.1  # between the request and armed motors
 SATURATED = 1.0 - 1e-9

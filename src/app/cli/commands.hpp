@@ -2,7 +2,7 @@
 #pragma once
 
 #include "app/cli/command_line.hpp"
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 
 namespace equipoise::app {
 

@@ -4,7 +4,7 @@
 #include <fstream>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/version.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
+#include "app/text/json.hpp"
 #include "robots/robot_list.hpp"
 
 namespace equipoise::app {

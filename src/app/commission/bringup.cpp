@@ -3,14 +3,14 @@
 #include <filesystem>
 #include <memory>
 
-#include "app/board/board_edit.hpp"
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
+#include "app/commission/board_edit.hpp"
 #include "app/commission/calibrate_imu.hpp"
 #include "app/commission/calibrate_wheels.hpp"
 #include "app/commission/commissioning.hpp"
 #include "app/doctor/doctor.hpp"
+#include "app/text/json.hpp"
 
 namespace equipoise::app {
 namespace {

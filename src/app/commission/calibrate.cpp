@@ -5,11 +5,11 @@
 
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
-#include "app/cli/text.hpp"
 #include "app/commission/calibrate_imu.hpp"
 #include "app/commission/calibrate_wheels.hpp"
 #include "app/commission/commissioning.hpp"
+#include "app/text/format.hpp"
+#include "app/text/json.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "app/cli/text.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 

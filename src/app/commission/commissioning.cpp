@@ -7,10 +7,10 @@
 #include <cerrno>
 #include <cstdio>
 
+#include "app/board/self_test.hpp"
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/commission/self_test.hpp"
-#include "app/run/firmware.hpp"
+#include "app/trial/firmware.hpp"
 #include "bbb.h"
 
 namespace equipoise::app {

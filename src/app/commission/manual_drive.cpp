@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "app/board/self_test.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/commission/self_test.hpp"
 #include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {

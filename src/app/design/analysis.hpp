@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "app/cli/json.hpp"
+#include "app/text/json.hpp"
 
 namespace equipoise::app {
 

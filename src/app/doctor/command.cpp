@@ -4,9 +4,9 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
-#include "app/cli/version.hpp"
 #include "app/doctor/doctor.hpp"
+#include "app/text/json.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app {
 namespace {

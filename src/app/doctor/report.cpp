@@ -6,8 +6,8 @@
 
 #include "app/board/calibration_file.hpp"
 #include "app/cli/commands.hpp"
-#include "app/cli/version.hpp"
 #include "app/doctor/doctor.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app::doctor {
 namespace {

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
 #include "app/cli/progress.hpp"
 #include "app/io/plant_backend.hpp"
-#include "app/run/firmware.hpp"
 #include "app/run/realtime_session.hpp"
+#include "app/text/json.hpp"
+#include "app/trial/firmware.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/recorded_samples.hpp"
 

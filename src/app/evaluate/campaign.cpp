@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
-#include "app/cli/reasons.hpp"
 #include "app/evaluate/fault_run.hpp"
 #include "app/evaluate/parallel.hpp"
-#include "app/run/firmware.hpp"
+#include "app/text/json.hpp"
+#include "app/text/reasons.hpp"
+#include "app/trial/firmware.hpp"
 #include "config/population.hpp"
 
 namespace equipoise::app {

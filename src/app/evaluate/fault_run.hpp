@@ -10,7 +10,7 @@
 
 #include "app/io/fault_backend.hpp"
 #include "app/io/plant_backend.hpp"
-#include "app/run/firmware.hpp"
+#include "app/trial/firmware.hpp"
 #include "equipoise/runtime/latest_command.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"

@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
 #include "app/evaluate/parallel.hpp"
 #include "app/sim/sim_job.hpp"
+#include "app/text/json.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -12,7 +12,7 @@
 #include "app/board/board.hpp"
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/run/service_notify.hpp"
+#include "app/guard/service_notify.hpp"
 #include "equipoise/runtime/monotonic.hpp"
 #include "equipoise/runtime/realtime.hpp"
 

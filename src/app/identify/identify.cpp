@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
 #include "app/identify/identification.hpp"
+#include "app/text/json.hpp"
 #include "equipoise/config.hpp"
 
 namespace equipoise::app {

@@ -4,9 +4,9 @@
 #include <memory>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
 #include "app/cli/progress.hpp"
 #include "app/identify/bench_log.hpp"
+#include "app/text/json.hpp"
 
 namespace equipoise::app {
 namespace {

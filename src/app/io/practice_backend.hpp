@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "app/cli/errors.hpp"
 #include "app/io/fault_backend.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/runtime/monotonic.hpp"
 #include "equipoise/types.hpp"
 

@@ -6,9 +6,9 @@
 #include <set>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
 #include "app/log/mcap_writer.hpp"
 #include "app/log/run_log.hpp"
+#include "app/text/json.hpp"
 #include "equipoise/runtime/wire.hpp"
 
 namespace equipoise::app {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 
 namespace equipoise::app {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "app/cli/json.hpp"
 #include "app/log/run_log.hpp"
-#include "app/run/verdict.hpp"
+#include "app/text/json.hpp"
+#include "app/trial/verdict.hpp"
 
 namespace equipoise::app {
 

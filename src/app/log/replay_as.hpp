@@ -11,7 +11,7 @@
 #include "app/cli/commands.hpp"
 #include "app/log/replay.hpp"
 #include "app/log/retuned.hpp"
-#include "app/run/firmware.hpp"
+#include "app/trial/firmware.hpp"
 #include "equipoise/runtime/fields.hpp"
 #include "equipoise/runtime/loop.hpp"
 

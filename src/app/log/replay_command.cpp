@@ -2,10 +2,10 @@
 #include <cstdio>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
-#include "app/cli/reasons.hpp"
-#include "app/cli/version.hpp"
 #include "app/log/replay.hpp"
+#include "app/text/json.hpp"
+#include "app/text/reasons.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app {
 namespace {

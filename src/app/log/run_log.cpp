@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/runtime/wire.hpp"
 
 namespace equipoise::app {

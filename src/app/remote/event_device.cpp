@@ -6,8 +6,8 @@
 #include <cstring>
 #include <thread>
 
-#include "app/cli/errors.hpp"
 #include "app/remote/seconds.hpp"
+#include "app/text/errors.hpp"
 
 namespace equipoise::app {
 EventDevice::EventDevice(RemoteFile file) : file_(std::move(file)), controls_(file_.events.size()) {

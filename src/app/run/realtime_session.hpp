@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
-#include "app/cli/json.hpp"
 #include "app/guard/guard_process.hpp"
+#include "app/text/json.hpp"
 #include "equipoise/runtime/realtime.hpp"
 #include "equipoise/runtime/supervisor.hpp"
 

@@ -12,10 +12,10 @@
 #include <optional>
 #include <sstream>
 
-#include "app/cli/errors.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/cli/json.hpp"
 #include "app/run/conversation.hpp"
+#include "app/text/errors.hpp"
+#include "app/text/json.hpp"
 
 namespace equipoise::app {
 

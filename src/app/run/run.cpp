@@ -2,13 +2,13 @@
 #include <cstring>
 
 #include "app/board/board.hpp"
+#include "app/board/self_test.hpp"
 #include "app/cli/commands.hpp"
-#include "app/commission/self_test.hpp"
 #include "app/io/lockstep.hpp"
 #include "app/io/plant_backend.hpp"
 #include "app/io/practice_backend.hpp"
-#include "app/log/log_name.hpp"
 #include "app/run/runner.hpp"
+#include "app/trial/log_name.hpp"
 #include "bbb.h"
 #include "config/population.hpp"
 

@@ -1,9 +1,9 @@
 #include <cstdio>
 #include <limits>
 
-#include "app/cli/reasons.hpp"
-#include "app/cli/version.hpp"
 #include "app/run/run_arguments.hpp"
+#include "app/text/reasons.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -7,14 +7,14 @@
 #include <functional>
 
 #include "app/cli/key_file.hpp"
+#include "app/guard/service_notify.hpp"
 #include "app/io/hardware.hpp"
 #include "app/remote/hand_remote.hpp"
 #include "app/run/panel.hpp"
 #include "app/run/run_arguments.hpp"
-#include "app/run/script.hpp"
-#include "app/run/service_notify.hpp"
 #include "app/run/trial_observer.hpp"
 #include "app/run/wires.hpp"
+#include "app/trial/script.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 
 namespace equipoise::app {

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "app/run/verdict.hpp"
+#include "app/trial/verdict.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise::app {

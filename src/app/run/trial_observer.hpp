@@ -8,9 +8,9 @@
 #include <limits>
 
 #include "app/cli/interrupt.hpp"
-#include "app/run/firmware.hpp"
 #include "app/run/status_indicator.hpp"
 #include "app/run/trial.hpp"
+#include "app/trial/firmware.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"
 #include "equipoise/runtime/telemetry.hpp"

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "app/run/path.hpp"
-#include "app/run/verdict.hpp"
+#include "app/trial/path.hpp"
+#include "app/trial/verdict.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise::app {

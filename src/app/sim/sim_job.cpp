@@ -1,6 +1,6 @@
 #include "app/sim/sim_job.hpp"
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 
 namespace equipoise::app {
 namespace {

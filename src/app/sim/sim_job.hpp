@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "app/cli/json.hpp"
-#include "app/cli/reasons.hpp"
 #include "app/sim/simulate.hpp"
+#include "app/text/json.hpp"
+#include "app/text/reasons.hpp"
 #include "config/population.hpp"
 
 namespace equipoise::app {

@@ -6,9 +6,9 @@
 #include <atomic>
 #include <functional>
 
-#include "app/run/firmware.hpp"
-#include "app/run/script.hpp"
 #include "app/sim/run_meter.hpp"
+#include "app/trial/firmware.hpp"
+#include "app/trial/script.hpp"
 
 namespace equipoise::app {
 

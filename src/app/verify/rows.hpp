@@ -2,7 +2,7 @@
 #pragma once
 
 #include "app/cli/commands.hpp"
-#include "app/cli/json.hpp"
+#include "app/text/json.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise::app {

@@ -2,7 +2,7 @@
 // Tests only.
 #pragma once
 
-#include "app/run/firmware.hpp"
+#include "app/trial/firmware.hpp"
 #include "config/common_config.hpp"
 #include "robots/cart_pendulum/world.hpp"
 #include "support/trial.hpp"

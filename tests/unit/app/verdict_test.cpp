@@ -1,10 +1,10 @@
-#include "app/run/verdict.hpp"
+#include "app/trial/verdict.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "app/cli/json.hpp"
+#include "app/text/json.hpp"
 #include "equipoise/actuate/safety_reasons.hpp"
 
 namespace equipoise::app {

@@ -28,6 +28,7 @@ OS_HEADERS = re.compile(
 LIBRARIES_OUTSIDE_CORE = re.compile(r"lcm/.*|toml.*|CLI/.*|nlohmann/.*|sodium.*|gpiod.*|equipoise/\w+_t\.hpp")
 C_HEADERS_IN_CORE = ("math.h", "stdbool.h", "stdint.h", "stddef.h", "float.h")
 
+_MODULE = re.compile(r"src/app/(\w+)/")
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.M)
 _ROBOT_BRANCH = re.compile(
     r"\bif\s*\([^;{}]*\brobot\w*(?:\(\))?\s*[!=]=|\bswitch\s*\([^;{}()]*\brobot\w*(?:\(\))?\s*\)"
@@ -133,5 +134,33 @@ def check_one_loop(tree: Tree) -> list[Finding]:
     return findings
 
 
+def check_module_cycles(tree: Tree) -> list[Finding]:
+    """No folder of the application depends on one that depends on it."""
+    uses: dict[str, dict[str, Finding]] = {}
+    for name in tree.ending(".cpp", ".hpp"):
+        if not (module := _MODULE.match(name)):
+            continue
+        for line, header, _ in includes(tree.text(name)):
+            other = _MODULE.match("src/" + header)
+            if other and other[1] != module[1]:
+                found = Finding(name, line, f"includes {header}: {other[1]} depends on {module[1]}")
+                uses.setdefault(module[1], {}).setdefault(other[1], found)
+
+    def reaches(start: str, goal: str) -> bool:
+        seen, left = set(), [start]
+        while left:
+            module = left.pop()
+            if module == goal:
+                return True
+            if module not in seen:
+                seen.add(module)
+                left += uses.get(module, {})
+        return False
+
+    return [
+        found for module, others in uses.items() for other, found in others.items() if reaches(other, module)
+    ]
+
+
 def law(tree: Tree) -> list[Finding]:
-    return check_includes(tree) + check_robot_switch(tree) + check_one_loop(tree)
+    return check_includes(tree) + check_robot_switch(tree) + check_one_loop(tree) + check_module_cycles(tree)

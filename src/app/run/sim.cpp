@@ -6,8 +6,8 @@
 
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/log/log_name.hpp"
 #include "app/sim/sim_job.hpp"
+#include "app/trial/log_name.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
@@ -87,7 +87,7 @@ class Pace {
 };
 
 template <class Firmware>
-int run(Arguments a) {
+int simulate_as(Arguments a) {
   SimRequest& request = a.request;
   const typename Firmware::Loaded loaded = load_for<Firmware>(&request);
   if (a.log.empty()) a.log = new_log_name("sim", Firmware::kName);
@@ -121,7 +121,7 @@ int run(Arguments a) {
   print_summary<Firmware>(out, request, summary);
   std::fprintf(out, "  log             %s\n", a.log.c_str());
   if (!a.json.empty()) {
-    nlohmann::json json = to_json<Firmware>(request, summary, loaded.sha256);
+    nlohmann::json json = app::to_json<Firmware>(request, summary, loaded.sha256);
     json["log"] = a.log;
     write_json(json, a.json);
   }
@@ -132,9 +132,9 @@ int run(Arguments a) {
   return summary.verdict.fell() ? 1 : 0;
 }
 
-int run(const Arguments& a) {
+int run_sim(const Arguments& a) {
   return with_robot(robot_type(a.request.config), a.request.config,
-                    [&](auto firmware) { return run<decltype(firmware)>(a); });
+                    [&](auto firmware) { return simulate_as<decltype(firmware)>(a); });
 }
 
 }  // namespace
@@ -178,7 +178,7 @@ void add_sim(Subcommand app) {
   command.option("--telemetry", a->telemetry, "LCM provider URL, or off").show_default();
   command.action([=] {
     if (yaw_hz.given()) a->request.yaw_rate_rad_s = 2.0 * kPi * a->yaw_hz;
-    return run(*a);
+    return run_sim(*a);
   });
 }
 

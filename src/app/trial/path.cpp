@@ -1,4 +1,4 @@
-#include "app/run/path.hpp"
+#include "app/trial/path.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <sstream>
 #include <vector>
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 
 namespace equipoise::app {
 namespace {

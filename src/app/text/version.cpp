@@ -1,4 +1,4 @@
-#include "app/cli/version.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app {
 

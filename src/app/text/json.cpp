@@ -1,9 +1,9 @@
-#include "app/cli/json.hpp"
+#include "app/text/json.hpp"
 
 #include <cstdio>
 #include <fstream>
 
-#include "app/cli/errors.hpp"
+#include "app/text/errors.hpp"
 
 template class nlohmann::basic_json<>;
 

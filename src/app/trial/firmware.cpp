@@ -1,4 +1,4 @@
-#include "app/run/firmware.hpp"
+#include "app/trial/firmware.hpp"
 
 namespace equipoise::app {
 

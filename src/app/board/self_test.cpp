@@ -1,4 +1,4 @@
-#include "app/commission/self_test.hpp"
+#include "app/board/self_test.hpp"
 
 #include <cmath>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "app/run/service_notify.hpp"
+#include "app/guard/service_notify.hpp"
 
 #include <sys/socket.h>
 #include <sys/un.h>

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "app/run/path.hpp"
+#include "app/trial/path.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise::app {

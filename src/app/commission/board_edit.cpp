@@ -1,4 +1,4 @@
-#include "app/board/board_edit.hpp"
+#include "app/commission/board_edit.hpp"
 
 #include <algorithm>
 #include <sstream>

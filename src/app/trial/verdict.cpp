@@ -1,10 +1,10 @@
-#include "app/run/verdict.hpp"
+#include "app/trial/verdict.hpp"
 
 #include <cmath>
 #include <cstdio>
 
-#include "app/cli/json.hpp"
-#include "app/cli/reasons.hpp"
+#include "app/text/json.hpp"
+#include "app/text/reasons.hpp"
 
 namespace equipoise::app {
 namespace {

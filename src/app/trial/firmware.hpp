@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "app/cli/version.hpp"
+#include "app/text/version.hpp"
 #include "equipoise/config.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "robots/robot_list.hpp"

@@ -1,4 +1,4 @@
-#include "app/log/log_name.hpp"
+#include "app/trial/log_name.hpp"
 
 #include <ctime>
 #include <filesystem>
