@@ -87,6 +87,7 @@ SafetyParams read_safety(Section s) {
   p.max_attitude_age_ticks = s.integer("max_attitude_age_ticks", 1, 200);
   p.min_battery_V = s.number("min_battery_V", 0.0, 60.0);
   p.cutoff_battery_V = s.number("cutoff_battery_V", 0.0, 60.0);
+  if (s.has("detection")) p.detection = s.boolean("detection");
   p.max_innovation = s.number("max_innovation", 1.0, 1000.0);
   p.max_innovation_published = s.number("max_innovation_published", 1.0, 1000.0);
   p.max_innovation_s = s.number("max_innovation_s", 0.0, 10.0);

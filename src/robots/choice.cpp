@@ -1,6 +1,7 @@
 #include "robots/choice.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace equipoise {
 
@@ -13,6 +14,19 @@ std::size_t fidelity_level(const std::string& name) {
 void allow_another_robot(SafetyParams* safety) {
   safety->max_identical_samples = 0;
   safety->max_innovation = std::max(safety->max_innovation, safety->max_innovation_published);
+}
+
+void doubt_nothing(const Choice& choice, SafetyParams* safety) {
+  if (choice.fidelity.empty() && choice.backend != "lockstep")
+    throw ConfigError("safety.detection = false: simulated robots only; a real one keeps its fault detection");
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  safety->max_innovation = kNever;
+  safety->max_tilt_sigma_rad = kNever;
+  safety->max_bias_drift_rad_s = kNever;
+  safety->max_disturbance = kNever;
+  safety->max_slip_rad_s = kNever;
+  safety->encoder_check_drive = 0.0;
+  safety->encoder_probe_drive = 0.0;
 }
 
 double gyro_delay_s(const WorldParams& world) {

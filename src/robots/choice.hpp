@@ -27,6 +27,10 @@ std::size_t fidelity_level(const std::string& name);
 /// An engine's IMU may be noiseless and stand still, and its robot is not the one the filters were tuned on.
 void allow_another_robot(SafetyParams* safety);
 
+/// The twin of a simulated run, in which only a fall, a limit of the motors or a sensor that is gone ends it;
+/// ConfigError on a board.
+void doubt_nothing(const Choice& choice, SafetyParams* safety);
+
 /// What the firmware is told of the simulated IMU: its register, not what this chip makes of it.
 double gyro_delay_s(const WorldParams& world);
 
@@ -44,6 +48,8 @@ Config with_choice(Config config, const Choice& choice, const std::array<const c
   if (config.estimators.active == published)
     config.safety.max_innovation = config.safety.max_innovation_published;
   if (choice.backend == "lockstep") allow_another_robot(&config.safety);
+  if (!config.safety.detection) doubt_nothing(choice, &config.safety);
+  config.estimators.detection = config.safety.detection;
   // In simulation the firmware is configured for the robot it is on: the level's bridge and IMU, no
   // compensation of absent friction.
   if (!choice.fidelity.empty()) {

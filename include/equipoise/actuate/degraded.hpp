@@ -27,6 +27,9 @@ enum DegradedBit : std::uint32_t {
 inline constexpr std::uint32_t kSensorsLeftOut =
     kWithoutWheelOne | kWithoutWheelTwo | kWithoutWheelThree | kWithoutWheelFour | kWithoutGyroAxis;
 
+/// What a fault detector has decided, not what is missing for a while.
+inline constexpr std::uint32_t kSensorsJudged = kSensorsLeftOut | kGyroBiasJumped;
+
 struct DegradedMode {
   const char* name;
   double max_speed_m_s;

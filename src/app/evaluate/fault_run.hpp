@@ -72,7 +72,7 @@ class FaultJudge {
     moved(since, command, on, truth.position_W_m);
     if (since >= 0) outcome_.degraded |= t.degraded;
     if (since >= 0 && outcome_.found_after_ticks < 0 &&
-        (t.degraded & (kSensorsLeftOut | kGyroBiasJumped)) != 0)
+        (t.degraded & kSensorsJudged) != 0)
       outcome_.found_after_ticks = since + 1;
     outcome_.upright = armed && truth.theta_rad.head<2>().norm() < max_tilt_rad_;
     lying_ = on && truth.theta_rad.head<2>().norm() > max_tilt_rad_ ? lying_ + 1 : 0;

@@ -16,6 +16,7 @@ struct Arguments {
   std::string json = "-";
   std::vector<std::string> set;
   int jobs = 0;
+  bool twins = false;
 };
 
 template <class Value>
@@ -50,24 +51,39 @@ SimRequest request_of(const Arguments& a, const nlohmann::json& row) {
 }
 
 template <class Firmware>
-nlohmann::json run(SimRequest r) {
-  std::vector<config::Drawn> drawn;
-  const auto loaded = load_for<Firmware>(&r, &drawn);
+SimSummary summary_of(SimRequest* r, std::vector<config::Drawn>* drawn = nullptr) {
+  const auto loaded = load_for<Firmware>(r, drawn);
   const std::atomic<bool> stop{false};
-  const SimOptions options = options_for<Firmware>(r, loaded.config);
-  nlohmann::json imperfections = nlohmann::json::object();
-  for (const config::Drawn& d : drawn) {
-    for (std::size_t i = 0; i < d.values.size(); ++i)
-      imperfections[d.values.size() == 1 ? d.key : d.key + "[" + std::to_string(i) + "]"] = d.values[i];
-  }
-  nlohmann::json row = figures<Firmware>(simulate<Firmware>(loaded.config, r.choice, options, {}, stop));
+  return simulate<Firmware>(loaded.config, r->choice, options_for<Firmware>(*r, loaded.config), {}, stop);
+}
+
+/// What its fault detection did to a robot without a fault; null where no twin without it has run.
+template <class Firmware>
+nlohmann::json judged(const SimSummary& run, SimRequest r, bool twins) {
+  nlohmann::json out{{"excluded_healthy", (run.degraded & kSensorsJudged) != 0},
+                     {"off_though_it_stands", nullptr},
+                     {"saved_by_detector", nullptr}};
+  if (!twins) return out;
+  r.set.emplace_back("safety.detection=false");
+  const bool twin_stands = !summary_of<Firmware>(&r).verdict.fell();
+  out["off_though_it_stands"] = run.verdict.ended == Ended::kDisarmed && twin_stands;
+  out["saved_by_detector"] = !run.verdict.fell() && !twin_stands;
+  return out;
+}
+
+template <class Firmware>
+nlohmann::json run(SimRequest r, bool twins) {
+  std::vector<config::Drawn> drawn;
+  const SimSummary summary = summary_of<Firmware>(&r, &drawn);
+  nlohmann::json row = figures<Firmware>(summary);
+  row.update(judged<Firmware>(summary, r, twins));
   row.update({{"robot", r.robot},
               {"seed", r.seed},
               {"yaw_hz", r.yaw_rate_rad_s / (2.0 * kPi)},
               {"drive_mps", r.drive_mps},
               {"duration_s", r.duration_s},
               {"fidelity", r.choice.fidelity},
-              {"drawn", imperfections}});
+              {"drawn", by_name(drawn)}});
   return row;
 }
 
@@ -81,7 +97,7 @@ int run_all(const Arguments& a) {
     throw InputError(a.in + ": " + error.what());
   }
   const auto rows = in_parallel<nlohmann::json>("trials", trials.size(), threads_for(a.jobs),
-                                                [&](std::size_t i) { return run<Firmware>(trials[i]); });
+                                                [&](std::size_t i) { return run<Firmware>(trials[i], a.twins); });
   write_json({{"robot", Firmware::kName}, {"version", version()}, {"trials", rows}}, a.json);
   return 0;
 }
@@ -102,6 +118,8 @@ void add_trials(Subcommand app) {
       .required();
   command.option("--json", a->json, "results in the same order, - for stdout").file().show_default();
   command.option("--set", a->set, "override a configuration key in every trial");
+  command.flag("--twins", a->twins,
+               "run each again with safety.detection = false: was a robot off that stands, or saved?");
   command.option("--jobs", a->jobs, "threads; 0: one per core. The results do not depend on it")
       .show_default()
       .range(0, 1024);

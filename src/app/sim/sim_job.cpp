@@ -14,6 +14,15 @@ void check_range(const char* name, double value, double low, double high) {
 
 }  // namespace
 
+nlohmann::json by_name(const std::vector<config::Drawn>& drawn) {
+  nlohmann::json out = nlohmann::json::object();
+  for (const config::Drawn& d : drawn) {
+    for (std::size_t i = 0; i < d.values.size(); ++i)
+      out[d.values.size() == 1 ? d.key : d.key + "[" + std::to_string(i) + "]"] = d.values[i];
+  }
+  return out;
+}
+
 void check(const SimRequest& r) {
   check_range("yaw_hz", r.yaw_rate_rad_s / (2.0 * kPi), -kMostYaw_hz, kMostYaw_hz);
   check_range("drive_mps", r.drive_mps, -kMostDrive_mps, kMostDrive_mps);

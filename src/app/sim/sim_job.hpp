@@ -55,6 +55,9 @@ SimOptions options_for(const SimRequest& request, const typename Firmware::Confi
   return options;
 }
 
+/// One number by name; elements of an array are name[0], name[1], ...
+nlohmann::json by_name(const std::vector<config::Drawn>& drawn);
+
 /// What a run came to, without what was asked for. NaN, never counted, is written as null.
 template <class Firmware>
 nlohmann::json figures(const SimSummary& s) {

@@ -105,21 +105,29 @@ void MbbrEstimators::integrate(Id id, double heading_rate) noexcept {
 EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
   EstimatorHealth<Mbbr::kWheels> h;
   if (params_.active != Id::kEkf) return h;
-  report(isolation_, &h);
+  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
+  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
+  h.predicts_wheels = true;
   h.gyro_bias_known = rest_bias_.known();
+  if (!params_.detection) return h;
+  report(isolation_, &h);
   h.dead = dead_encoders_.dead();
   h.bias_drift_rad_s = bias_drift_.distance();
   h.disturbance = ekf_.x().segment<3>(MbbrEkfModel::kDisturbance).norm();
   h.gyro_left_out = gyro_watch_.left_out();
   h.gyro_bias_jumped = gyro_watch_.bias_jumped();
   h.gyro_trusted = gyro_watch_.trusted();
-  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
-  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
   return h;
 }
 
 void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   MbbrEstimate& x = estimates_[index(Id::kEkf)];
+  if (!params_.detection) {
+    ekf_.predict(u);
+    ekf_.update(z);
+    x = ekf_.estimate();
+    return;
+  }
   Mbbr::Sample believed = z;
   const int jumps = gyro_watch_.bias_jumps();
   gyro_watch_.screen(believed, x.omega_B, u);

@@ -134,6 +134,15 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
 
 void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   MipEstimate& x = estimates_[index(Id::kEkf)];
+  if (!params_.detection) {
+    ekf_.predict(u);
+    ekf_.update(z);
+    const Vec2 before = x.position_W_m;
+    x = ekf_.estimate();
+    x.position_W_m = before;
+    move(Id::kEkf);
+    return;
+  }
   Mip::Sample believed = z;
   const Vec3 expected_rad_s = body_rates(x);
   const int jumps = gyro_watch_.bias_jumps();
@@ -196,16 +205,18 @@ void MipEstimators::attitude(const Mip::Sample& z) noexcept {
 EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
   EstimatorHealth<Mip::kWheels> h;
   if (params_.active != Id::kEkf) return h;
-  report(isolation_, &h);
+  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
+  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
+  h.predicts_wheels = true;
   h.gyro_bias_known = rest_bias_.known();
+  if (!params_.detection) return h;
+  report(isolation_, &h);
   h.dead = dead_encoders_.dead();
   h.bias_drift_rad_s = isolation_.suspects() ? 0.0 : bias_drift_.distance();
   h.disturbance = ekf_.x().segment<2>(MipEkfModel::kDisturbance).norm();
   h.gyro_left_out = gyro_watch_.left_out();
   h.gyro_bias_jumped = gyro_watch_.bias_jumped();
   h.gyro_trusted = gyro_watch_.trusted();
-  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
-  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
   return h;
 }
 

@@ -10,7 +10,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "robots/mbbr/config.hpp"
+#include "robots/mbbr/firmware.hpp"
 
 namespace equipoise {
 namespace {
@@ -183,6 +183,17 @@ TEST(Config, AMountThatIsNoRotationIsRefused) {
 }
 
 TEST(Config, MissingFileSaysWhatToDo) { EXPECT_THAT(error_of("nowhere.toml"), HasSubstr("--config FILE")); }
+
+TEST(Config, NothingIsDoubtedInSimulationOnly) {
+  const MbbrConfig config = load_mbbr(kMbbr, {"safety.detection=false"}).config;
+  Choice choice{"ekf", "scheduled", "full"};
+  EXPECT_FALSE(MbbrFirmware::apply(config, choice).estimators.detection);
+  EXPECT_TRUE(std::isinf(MbbrFirmware::apply(config, choice).safety.max_disturbance));
+  EXPECT_TRUE(std::isfinite(MbbrFirmware::apply(config, choice).safety.max_fall_rad));
+  choice.fidelity.clear();  // on hardware
+  choice.backend = "board";
+  EXPECT_THROW(MbbrFirmware::apply(config, choice), ConfigError);
+}
 
 }  // namespace
 }  // namespace equipoise
