@@ -126,6 +126,62 @@ nb::tuple run(app::SimRequest request, const nb::object& controller, const nb::o
   return nb::make_tuple(json, recorder ? nb::object(columns_of(*recorder)) : nb::none());
 }
 
+/// An engine in Python: `start` and `step` read `in` and fill `out`.
+class PythonEngine : public Engine {
+ public:
+  /// make(dimensions as JSON, in, out) -> (start, step)
+  PythonEngine(const nb::object& make, const nlohmann::json& dimensions, Attention* attention)
+      : attention_(*attention) {
+    const auto view = [](auto& numbers) {  // not a copy
+      return nb::cast(nb::ndarray<nb::numpy, double, nb::ndim<1>>(numbers.data(), {numbers.size()}),
+                      nb::rv_policy::reference);
+    };
+    const nb::tuple both = nb::cast<nb::tuple>(make(dimensions.dump(), view(in_), view(out_)));
+    start_ = both[0];
+    step_ = both[1];
+  }
+  void start(const Mat3& R_WB, EngineMotion* motion) override {
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out_.data()) = R_WB;
+    start_();
+    read(motion);
+  }
+  void step(const Vec3& torque, const Vec2& push_W_N, const Vec2& drag_W_N, EngineMotion* motion) override {
+    Eigen::Map<Vec<7>>(in_.data()) << torque, push_W_N, drag_W_N;
+    attention_.keep([this] { step_(); });
+    read(motion);
+  }
+
+ private:
+  void read(EngineMotion* m) const {
+    const double* at = out_.data();
+    m->R_WB = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(at);
+    at += 9;
+    for (Vec3* v : {&m->omega_B_rad_s, &m->specific_force_B_m_s2, &m->joint_rate_rad_s, &m->position_W_m,
+                    &m->velocity_W_m_s}) {
+      *v = Eigen::Map<const Vec3>(at);
+      at += 3;
+    }
+  }
+
+  Attention& attention_;
+  std::array<double, 7> in_{};    // joint torques (3), push (2), force on ball or axle (2)
+  std::array<double, 24> out_{};  // R_WB by rows, then the vectors of EngineMotion
+  nb::object start_, step_;
+};
+
+std::string run_in_engine(app::SimRequest request, const nb::object& make) {
+  app::check(request);
+  std::atomic<bool> stop{false};
+  Attention attention(nb::none(), &stop);
+  const auto engine = [&](const nlohmann::json& dimensions) {
+    return std::make_unique<PythonEngine>(make, dimensions, &attention);
+  };
+  const Simulated& robot = simulated(robot_type(request.config));
+  const nlohmann::json out = robot.run_in_engine(std::move(request), engine, stop);
+  attention.rethrow();
+  return out.dump();
+}
+
 /// Raw samples of a log, field by field, as SI.
 nb::ndarray<nb::numpy, double, nb::ndim<2>> calibrated(const std::string& type, const std::string& toml,
                                                        const Array& gyro, const Array& accel,
@@ -253,6 +309,15 @@ NB_MODULE(_core, m) {
   m.def("run", &run, nb::arg("request"), nb::arg("controller").none(), nb::arg("estimator").none(),
         nb::arg("record"), nb::arg("progress").none(),
         "(figures as JSON, columns by channel where recorded)");
+  m.def(
+      "dimensions",
+      [](const app::SimRequest& request) {
+        return simulated(robot_type(request.config)).dimensions(request).dump();
+      },
+      nb::arg("request"), "of the robot as drawn, SI by name, as JSON");
+  m.def("run_in_engine", &run_in_engine, nb::arg("request"), nb::arg("make"),
+        "figures as JSON of a run whose rigid bodies are another engine's; "
+        "make(dimensions as JSON, in, out) -> (start, step)");
   m.def(
       "design",
       [](const std::string& config, const std::vector<std::string>& set, const std::string& estimator,

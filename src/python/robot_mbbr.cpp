@@ -23,6 +23,21 @@ struct MbbrAccess {
     w << r.phi_dot_star, r.yaw_rate;
     return w;
   }
+  static nlohmann::json dimensions(const MbbrParameters& nominal, const MbbrWorldParams& world) {
+    const MbbrParameters p = as_built(nominal, world.common.actual);
+    return {{"body_mass_kg", p.m_t},
+            {"com_height_m", p.l},
+            {"body_inertia_kg_m2", {p.I_t1, p.I_t2, p.I_t3}},
+            {"ball_mass_kg", p.m_b},
+            {"ball_radius_m", p.r},
+            {"ball_inertia_kg_m2", p.I_b},
+            {"wheel_inertia_about_ball_kg_m2", p.I_w},
+            {"imu_position_m", {p.l_a.x(), p.l_a.y(), p.l_a.z()}},
+            {"floor_grip", world.floor.grip},
+            {"floor_torsion_radius_m", world.floor.torsion_radius_m},
+            {"floor_slope_rad", {world.common.floor_slope_rad.x(), world.common.floor_slope_rad.y()}},
+            {"step_s", world.common.step_s}};
+  }
   static MbbrEstimate estimate(const StateView& v, const MbbrParameters&) {
     MbbrEstimate x;
     x.theta_xy = v.theta_rad.head<2>();

@@ -16,6 +16,19 @@ struct MipAccess {
     return e;
   }
   static Vec2 wanted(const MipReference& r) { return {r.phi_dot, r.psi_dot}; }
+  static nlohmann::json dimensions(const MipParameters& nominal, const MipWorldParams& world) {
+    const MipParameters p = as_built(nominal, world.common.actual);
+    return {{"body_mass_kg", p.m_b},
+            {"com_height_m", p.l},
+            {"body_inertia_kg_m2", {p.I_b1, p.I_b2, p.I_b3}},
+            {"wheel_mass_kg", p.m_w},
+            {"wheel_radius_m", p.r},
+            {"track_m", p.d},
+            {"wheel_inertia_kg_m2", {p.I_w1, p.I_w2, p.I_w3}},
+            {"imu_position_m", {p.l_a.x(), p.l_a.y(), p.l_a.z()}},
+            {"floor_slope_rad", {world.common.floor_slope_rad.x(), world.common.floor_slope_rad.y()}},
+            {"step_s", world.common.step_s}};
+  }
   static MipEstimate estimate(const StateView& v, const MipParameters&) {
     MipEstimate x;
     x.theta = v.theta_rad.x();

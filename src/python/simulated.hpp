@@ -80,6 +80,34 @@ class SimulatedOf : public Simulated {
     return out;
   }
 
+  nlohmann::json dimensions(app::SimRequest request) const override {
+    const Config config = Firmware::apply(app::load_for<Firmware>(&request).config, request.choice);
+    return Access::dimensions(config.robot, config.world[fidelity_level(request.choice.fidelity)]);
+  }
+
+  nlohmann::json run_in_engine(app::SimRequest request, const MakeEngine& make,
+                               const std::atomic<bool>& stop) const override {
+    std::vector<config::Drawn> drawn;
+    const auto loaded = app::load_for<Firmware>(&request, &drawn);
+    const app::SimOptions options = app::options_for<Firmware>(request, loaded.config);
+    const Config config = Firmware::apply(loaded.config, request.choice);
+    auto params = config.world[fidelity_level(request.choice.fidelity)];
+    params.common.seed = request.seed;
+    const auto engine = make(Access::dimensions(config.robot, params));
+    typename Firmware::EngineWorld world(config.robot, config.motor, config.calibration, params, *engine);
+    const app::SimSummary summary =
+        Firmware::with_pipeline(config, request.choice.controller, [&](auto& pipeline) {
+          using Pipeline = std::decay_t<decltype(pipeline)>;
+          return app::SimulatedRun<Firmware, typename Firmware::EngineWorld, Pipeline>(
+                     world, pipeline, Firmware::rolling_radius_m(config), options, {}, stop)
+              .run();
+        });
+    nlohmann::json out = app::figures<Firmware>(summary);
+    out["excluded_healthy"] = (summary.degraded & kSensorsJudged) != 0;
+    out["drawn"] = app::by_name(drawn);
+    return out;
+  }
+
   std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const override {
     const auto loaded = app::load_for<Firmware>(&request);
     const Config config = Firmware::apply(loaded.config, request.choice);

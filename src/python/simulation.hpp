@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "app/sim/sim_job.hpp"
+#include "equipoise/plant/engine.hpp"
 #include "python/recorder.hpp"
 
 namespace equipoise::python {
@@ -69,6 +70,12 @@ class Simulated {
   /// `recorder` may be nullptr.
   virtual nlohmann::json run(app::SimRequest request, const Hooks& hooks, Recorder* recorder,
                              const app::TickObserver& observe, const std::atomic<bool>& stop) const = 0;
+  /// Of the robot as drawn, SI by name: what an engine builds it from.
+  virtual nlohmann::json dimensions(app::SimRequest request) const = 0;
+  /// The same run in an engine that `make` builds from those.
+  using MakeEngine = std::function<std::unique_ptr<Engine>(const nlohmann::json& dimensions)>;
+  virtual nlohmann::json run_in_engine(app::SimRequest request, const MakeEngine& make,
+                                       const std::atomic<bool>& stop) const = 0;
   /// f(seed): configured once, as many episodes as are wanted.
   virtual std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const = 0;
   /// Before their next step(), which then finds the numbers of its world: at most kRobotsTogether of one

@@ -7,6 +7,7 @@
 
 #include "robots/choice.hpp"
 #include "robots/mbbr/config.hpp"
+#include "robots/mbbr/engine_world.hpp"
 #include "robots/mbbr/world.hpp"
 
 namespace equipoise {
@@ -16,6 +17,7 @@ struct MbbrFirmware {
   using Config = MbbrConfig;
   using Loaded = equipoise::Loaded<MbbrConfig>;
   using World = MbbrWorld;
+  using EngineWorld = MbbrEngineWorld;
   static constexpr const char* kName = "mbbr";
   static constexpr const char* kDefaultEstimator = "ekf";
   static constexpr const char* kDefaultController = "scheduled";

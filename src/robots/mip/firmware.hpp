@@ -7,6 +7,7 @@
 
 #include "robots/choice.hpp"
 #include "robots/mip/config.hpp"
+#include "robots/mip/engine_world.hpp"
 #include "robots/mip/world.hpp"
 
 namespace equipoise {
@@ -16,6 +17,7 @@ struct MipFirmware {
   using Config = MipConfig;
   using Loaded = equipoise::Loaded<MipConfig>;
   using World = MipWorld;
+  using EngineWorld = MipEngineWorld;
   static constexpr const char* kName = "mip";
   static constexpr const char* kDefaultEstimator = "ekf";
   static constexpr const char* kDefaultController = "slc";

@@ -45,6 +45,18 @@ MipParameters as_built(MipParameters p, const ActualScales& actual) noexcept {
   return p;
 }
 
+Mat<2, 2> wheel_mobility(const MipParameters& robot) noexcept {
+  const MipDynamics dynamics(robot);
+  const MipKinematics kinematics(robot);
+  Mat<2, 2> mobility;
+  for (int i = 0; i < 2; ++i) {
+    const Vec2 unit = Vec2::Unit(i);
+    const Vec3 a = dynamics.accelerations(MipMotion{}, unit.sum(), unit.x() - unit.y());
+    mobility.col(i) = kinematics.wheels(a(1), a(2));
+  }
+  return mobility;
+}
+
 MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
                    const MipWorldParams& world)
     : robot_(as_built(robot, world.common.actual)),
@@ -57,11 +69,7 @@ MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, con
       now_(start(robot_, world, start_noise_)),
       sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s()(kTheta), 0.0, s()(kPsi))),
       plain_(world.common.plain() && world.lift_at_s < 0.0) {
-  for (int i = 0; i < 2; ++i) {  // upright at rest
-    const Vec2 unit = Vec2::Unit(i);
-    const Vec3 a = dynamics_.accelerations(MipMotion{}, unit.sum(), unit.x() - unit.y());
-    Eigen::Map<Mat<2, 2>>(now_.mobility).col(i) = kinematics_.wheels(a(1), a(2));
-  }
+  Eigen::Map<Mat<2, 2>>(now_.mobility) = wheel_mobility(robot_);
 }
 
 Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept {

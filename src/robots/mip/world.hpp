@@ -29,6 +29,9 @@ struct MipWorldParams {
 /// The robot as it is built, where the firmware has `nominal`.
 MipParameters as_built(MipParameters nominal, const ActualScales& actual) noexcept;
 
+/// Of the wheels' encoder rates per torque at the wheels, upright at rest.
+Mat<2, 2> wheel_mobility(const MipParameters& robot) noexcept;
+
 class MipWorld {
  public:
   using Rolling = MipRollingOf<double>;
