@@ -23,6 +23,9 @@ SETTINGS = {
     "estimator": "",
     "controller": "",
     "set": ["friction.compensation=0.9"],
+    "engine": "own",
+    "floor": "calm",
+    "twins": False,
     "version": "1",
 }
 

@@ -33,15 +33,23 @@ def identity(trial: dict) -> tuple:
     return trial["robot"], trial["seed"], float(trial["yaw_hz"]), float(trial["drive_mps"])
 
 
-def plan(robots: range, seeds: range, runs: list[tuple[float, float]], settings: dict) -> list[dict]:
-    """Every trial, one robot after the other, so that a part of the list is a smaller campaign."""
+SEEDS_APART = 1_000_000
+
+
+def plan(robots: range, seeds: int, runs: list[tuple[float, float]], settings: dict) -> list[dict]:
+    """Every trial, one robot after the other, so that a part of the list is a smaller campaign.
+
+    Robots do not share seeds: a start and a noise of one's own each.
+    """
     common = {
         key: settings[key] for key in ("duration_s", "fidelity", "estimator", "controller") if settings[key]
     }
+    if settings["engine"] == "mujoco":
+        common["floor"] = settings["floor"]
     return [
-        {"robot": robot, "seed": seed, "yaw_hz": yaw, "drive_mps": drive, **common}
+        {"robot": robot, "seed": robot + SEEDS_APART * k, "yaw_hz": yaw, "drive_mps": drive, **common}
         for robot in robots
-        for seed in seeds
+        for k in range(seeds)
         for yaw, drive in runs
     ]
 
@@ -51,12 +59,16 @@ def run_chunk(program: str, settings: dict, trials: list[dict]) -> list[dict]:
     with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
         request = Path(folder) / "trials.json"
         request.write_text(json.dumps({"trials": trials}))
-        command = [program, "trials", "--config", settings["config_path"], "--in", request, "--jobs", "1"]
+        engine = [program, "trials", "--jobs", "1"]
+        if settings["engine"] == "mujoco":
+            engine = [sys.executable, "-m", "equipoise_tools.mujoco_engine"]
+        command = [*engine, "--config", settings["config_path"], "--in", request]
         for text in settings["set"]:
             command += ["--set", text]
+        command += ["--twins"] if settings["twins"] else []
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise UserError(done.stderr.strip() or f"equipoise trials ended with {done.returncode}")
+        raise UserError(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
     return json.loads(done.stdout)["trials"]
 
 
@@ -167,15 +179,29 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--runs", nargs="+", type=pair, default=[pair(run) for run in RUNS])
     parser.add_argument("--seeds", type=int, default=1, help="runs of each robot at each point")
     parser.add_argument("--duration-s", type=float, default=60.0)
+    parser.add_argument(
+        "--engine", choices=("own", "mujoco"), default="own", help="whose rigid bodies and contacts"
+    )
+    parser.add_argument(
+        "--floor",
+        choices=("calm", "disturbed"),
+        default="calm",
+        help="of mujoco: level and untouched, or sloped, with sills of 1 to 2 mm and pushes of 1 to 4 N",
+    )
     parser.add_argument("--fidelity", default="full")
     parser.add_argument("--estimator", default="")
     parser.add_argument("--controller", default="")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument(
+        "--twins", action="store_true", help="each trial again with nothing judged: twice as long"
+    )
     parser.add_argument("--scheduler", help="address of an existing Dask scheduler, e.g. tcp://10.0.0.5:8786")
     parser.add_argument("--workers", type=int, default=0, help="0: one per core")
     parser.add_argument("--chunk", type=int, default=12, help="trials per piece of work")
     parser.add_argument("--out", type=Path, default=repository_root() / "build" / "campaign")
     given = parser.parse_args(words)
+    if given.engine == "own" and given.floor != "calm":
+        parser.error("--floor is mujoco's; of the own engine it is a key of [world.*], docs/disturbances.md")
     if min(given.robots, given.seeds, given.chunk) < 1 or given.first_robot < 0:
         parser.error("--robots, --seeds and --chunk must be 1 or more, --first-robot 0 or more")
     return given
@@ -199,6 +225,9 @@ def settings_of(given: argparse.Namespace) -> dict:
         "estimator": given.estimator,
         "controller": given.controller,
         "set": given.set,
+        "engine": given.engine,
+        "floor": given.floor,
+        "twins": given.twins,
     }
 
 
@@ -208,7 +237,7 @@ def main(words: list[str] | None = None) -> int:
         settings = settings_of(given)
         open_folder(given.out, settings)
         robots = range(given.first_robot, given.first_robot + given.robots)
-        wanted = plan(robots, range(1, given.seeds + 1), given.runs, settings)
+        wanted = plan(robots, given.seeds, given.runs, settings)
         done = {identity(row) for row in read_parts(given.out)}
         missing = [trial for trial in wanted if identity(trial) not in done]
         if missing:

@@ -16,6 +16,12 @@ def _column(rows: list[dict], key: str) -> np.ndarray:
     return np.array([np.nan if row.get(key) is None else row[key] for row in rows], dtype=float)
 
 
+def _count(rows: list[dict], key: str) -> str:
+    """How many; "-" where no twin has run that would tell."""
+    values = [row[key] for row in rows if row.get(key) is not None]
+    return str(sum(values)) if values else "-"
+
+
 def points_of(rows: list[dict]) -> list[tuple[float, float]]:
     return sorted({(row["yaw_hz"], row["drive_mps"]) for row in rows})
 
@@ -25,7 +31,12 @@ def at_point(rows: list[dict], point: tuple[float, float]) -> list[dict]:
 
 
 def replay_command(row: dict, settings: dict) -> str:
-    """One line that runs this trial again, with a log."""
+    """One line that runs this trial again; with a log, where our own world ran it."""
+    if settings["engine"] == "mujoco":
+        words = ["tools/campaign", "--engine", "mujoco", "--floor", settings["floor"]]
+        words += ["--config", settings["config"], "--first-robot", str(row["robot"]), "--robots", "1"]
+        words += ["--runs", f"{row['yaw_hz']:g},{row['drive_mps']:g}", "--out", "build/one"]
+        return shlex.join(words)
     words = [
         "build/host/equipoise",
         "sim",
@@ -71,17 +82,20 @@ def drawn_of(rows: list[dict]) -> dict[str, np.ndarray]:
 
 def survival_table(rows: list[dict]) -> list[str]:
     lines = [
-        "| yaw Hz | m/s | trials | upright | 95 % interval | of them degraded |",
-        "|---|---|---|---|---|---|",
+        "| yaw Hz | m/s | trials | upright | 95 % interval | healthy sensor excluded | off though it stands "
+        "| saved by detector |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for yaw, drive in points_of(rows):
         here = at_point(rows, (yaw, drive))
         upright = sum(not row["fell"] for row in here)
         low, high = wilson(upright, len(here))
-        degraded = sum(bool(row.get("degraded")) for row in here if not row["fell"])
+        judged = [
+            _count(here, key) for key in ("excluded_healthy", "off_though_it_stands", "saved_by_detector")
+        ]
         lines.append(
             f"| {yaw:g} | {drive:g} | {len(here)} | {100 * upright / len(here):.2f} % | "
-            f"{100 * low:.2f} - {100 * high:.2f} % | {degraded} |"
+            f"{100 * low:.2f} - {100 * high:.2f} % | {' | '.join(judged)} |"
         )
     return lines
 
@@ -152,13 +166,18 @@ def draw_pictures(rows: list[dict], out: Path) -> None:
         plt.close(figure)
 
 
+def engine_of(settings: dict) -> str:
+    return f" in MuJoCo, {settings['floor']} floor" if settings.get("engine") == "mujoco" else ""
+
+
 def page(rows: list[dict], settings: dict) -> str:
     robots = len({row["robot"] for row in rows})
     fell = [row for row in rows if row["fell"]]
     lines = [
         "# Campaign",
         f"{len(rows)} trials of {robots} robots drawn from `[population]` of {settings['config']}, world "
-        f"`{settings['fidelity']}`, {settings['duration_s']:g} s each; version {settings['version']}. "
+        f"`{settings['fidelity']}`{engine_of(settings)}, "
+        f"{settings['duration_s']:g} s each; version {settings['version']}. "
         f"{len(rows) - len(fell)} upright to the end, {len(fell)} not.",
         "",
         *survival_table(rows),
