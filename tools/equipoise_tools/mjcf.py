@@ -56,7 +56,7 @@ def inertia(moments: list[float]) -> str:
 def document(name: str, step_s: float, world: str, exact: dict[str, list[float]]) -> str:
     """`exact`: moments of bodies by name, which mujoco_engine gives to the compiled model.
 
-    Without its noslip iterations MuJoCo's contacts creep under load, and a ball that should stick to the floor spins.
+    Without its noslip iterations MuJoCo's contacts creep under load: a ball that should stick spins.
     """
     moments = "".join(
         f'<numeric name="inertia_{body}" data="{numbers(values)}"/>' for body, values in exact.items()
@@ -64,7 +64,8 @@ def document(name: str, step_s: float, world: str, exact: dict[str, list[float]]
     return f"""<mujoco model="{name}">
   {f"<custom>{moments}</custom>" if exact else ""}
   <compiler angle="radian"/>
-  <option timestep="{step_s:.9g}" gravity="0 0 -{G}" integrator="implicitfast" cone="elliptic" impratio="20" noslip_iterations="3"/>
+  <option timestep="{step_s:.9g}" gravity="0 0 -{G}" integrator="implicitfast" cone="elliptic"
+          impratio="20" noslip_iterations="3"/>
   <worldbody>
     <light pos="0 0 3"/>
     {world}
