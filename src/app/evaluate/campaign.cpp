@@ -138,7 +138,7 @@ std::vector<Case> cases_of(const CampaignArguments& a) {
           c.plan.fault_at_tick = fault_tick(c.plan.phase);
           if (a.after_s > 0.0) c.plan.end_tick = c.plan.fault_at_tick + static_cast<int>(a.after_s * kTickHz);
           c.robot = a.robot + r;
-          c.seed = a.seed + static_cast<std::uint64_t>(i);
+          c.seed = a.seed + static_cast<std::uint64_t>(r + a.robots * i);  // no two robots share one
           cases.push_back(c);
         }
       }
@@ -276,7 +276,7 @@ void add_campaign(Subcommand app) {
   auto a = std::make_shared<CampaignArguments>();
   command.option("--config", a->config, "robot configuration").file().required();
   command.option("--seeds", a->seeds, "runs per case").show_default().range(1, 1000);
-  command.option("--seed", a->seed, "the first").show_default();
+  command.option("--seed", a->seed, "the first; each robot and run takes the next").show_default();
   command.option("--fidelity", a->fidelity, "of the world").show_default();
   command.option("--controller", a->controller,
                  "which controller balances (default: the robot's): " + known_controllers());
