@@ -13,7 +13,7 @@ struct ConfigError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-inline const std::vector<std::string> kFidelityNames{"ideal", "thesis", "nominal", "full"};
+inline const std::vector<std::string> kFidelityNames{"ideal", "thesis", "nominal", "full", "built2025"};
 
 /// Name of the robot a file is for, without reading the rest.
 std::string robot_type(const std::string& path);

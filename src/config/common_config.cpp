@@ -22,7 +22,8 @@ double number_or(Section& s, const char* key, double otherwise, double min, doub
 }
 
 std::string world_key(const Section& worlds, const std::string& fidelity) {
-  return fidelity == "nominal" && !worlds.has(fidelity) ? "full" : fidelity;
+  const bool optional = fidelity == "nominal" || fidelity == "built2025";
+  return optional && !worlds.has(fidelity) ? "full" : fidelity;
 }
 
 void expect_robot(Section& robot, const std::string& type) {
@@ -144,6 +145,22 @@ ActualScales read_actual(Section s, bool has_ball) {
   return a;
 }
 
+VibrationParams read_vibration(Section s) {
+  VibrationParams v;
+  v.gyro_sigma_rad_s = s.vector<3>("gyro_sigma_rad_s", 0.0, 2.0);
+  v.accel_sigma_m_s2 = s.vector<3>("accel_sigma_m_s2", 0.0, 40.0);
+  v.gyro_half_rate_rad_s = s.number("gyro_half_rate_rad_s", 1e-3, 1e3);
+  v.accel_half_rate_rad_s = s.number("accel_half_rate_rad_s", 1e-3, 1e3);
+  v.centre_hz = s.number("centre_hz", 0.0, 0.5 * kTickHz);
+  v.bandwidth_hz = s.number("bandwidth_hz", 0.1, 1e3);
+  v.line_share = s.number("line_share", 0.0, 1.0);
+  v.lines_per_turn = s.vector<2>("lines_per_turn", 0.0, 1e4);
+  v.excess_kurtosis = s.number("excess_kurtosis", 0.0, 100.0);
+  v.burst_s = s.number("burst_s", 1e-3, 10.0);
+  s.finish();
+  return v;
+}
+
 void read_disturbance(Section& s, WorldParams* w) {
   w->stiction.static_ratio = s.number("static_ratio", 1.0, 5.0);
   w->stiction.rate_rad_s = s.number("stribeck_rate_rad_s", 1e-3, 100.0);
@@ -195,6 +212,8 @@ WorldParams read_world(Section s, BridgeType* bridge, const RobotsOwn& own) {
     row.finish();
     w.pushes.push_back(push);
   }
+  if (s.has("vibration")) w.vibration = read_vibration(s.table("vibration"));
+  if (s.has("population")) s.table("population");  // read when a robot is drawn
   if (s.has("actual")) w.actual = read_actual(s.table("actual"), own.has_ball);
   if (s.has("disturbance")) {
     Section disturbance = s.table("disturbance");

@@ -94,10 +94,11 @@ std::vector<Drawn> draw_robot(const std::string& path, const std::vector<std::st
   std::vector<Drawn> drawn;
   if (robot <= 0) return drawn;
   const Document document(path, overrides);
-  const toml::table* ranges = document.root()["population"].as_table();
-  if (ranges == nullptr) throw ConfigError(path + ": population: missing; robots are drawn from it");
   const toml::table* target = document.root()["world"][world].as_table();
   if (target == nullptr) throw ConfigError(path + ": world." + world + ": missing");
+  const toml::table* own = (*target)["population"].as_table();
+  const toml::table* ranges = own != nullptr ? own : document.root()["population"].as_table();
+  if (ranges == nullptr) throw ConfigError(path + ": population: missing; robots are drawn from it");
   draw(*ranges, *target, "", robot, &drawn);
   return drawn;
 }

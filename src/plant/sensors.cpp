@@ -28,6 +28,7 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
       accel_noise_(world.seed, kAccelNoise),
       encoder_noise_(world.seed, kEncoderNoise),
       attitude_noise_(world.seed, kAttitudeNoise),
+      vibration_(world.vibration, world.seed, static_cast<std::size_t>(wheels)),
       attitude_keep_(std::exp(-kTickS / world.attitude_time_constant_s)),
       attitude_kick_rad_(world.attitude_sigma_rad * std::sqrt(1.0 - attitude_keep_ * attitude_keep_)),
       heading_kick_rad_(world.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS)) {
@@ -88,11 +89,16 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
   };
   Vec3 gyro =
       as_mounted(m.omega_B_rad_s) + gyro_bias_ + gyro_noise_.gaussian_vector<3>(world_.gyro_sigma_rad_s);
+  Vec3 accel = as_mounted(m.specific_force_B_m_s2) + accel_bias_ +
+               accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
+  if (world_.vibration.on()) {
+    const Vibration::Shaken shaken = vibration_.update(m.wheel_angle_rad);
+    gyro += shaken.gyro_rad_s;
+    accel += shaken.accel_m_s2;
+  }
   gyro += world_.gyro_scale_error.cwiseProduct(gyro);
   if (!world_.gyro_drift_rad_s.isZero(0.0))
     gyro -= world_.gyro_drift_rad_s * std::expm1(-m.time_s / world_.warm_up_s);
-  const Vec3 accel = as_mounted(m.specific_force_B_m_s2) + accel_bias_ +
-                     accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
 
   const auto counts = [this](double value, double per_count) {
     const double n = value / per_count;

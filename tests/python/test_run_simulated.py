@@ -22,7 +22,7 @@ def equipoise(root):
 
 
 def practised(equipoise, robot, *arguments, code=0):
-    options = ["--backend", "sim", "--telemetry", "off", "--json", "-"]
+    options = ["--backend", "sim", "--fidelity", "built2025", "--telemetry", "off", "--json", "-"]
     return json.loads(
         equipoise("run", "--config", f"config/{robot}.toml", *options, *arguments, code=code).stdout
     )
@@ -33,7 +33,7 @@ def test_is_the_run_that_sim_simulates(equipoise, robot):
     """The same world, robot, seed and script, tick by tick: the extreme duty tells them apart."""
     script = ["--drive-mps", "0.1", "--duration-s", "4", "--robot", "7", "--seed", "3", "--log", "off"]
     run = practised(equipoise, robot, "--speed", "100", *script)
-    simulated = ["sim", "--config", f"config/{robot}.toml", "--fidelity", "full", "--telemetry", "off"]
+    simulated = ["sim", "--config", f"config/{robot}.toml", "--fidelity", "built2025", "--telemetry", "off"]
     sim = json.loads(equipoise(*simulated, "--json", "-", *script).stdout)
     same = ["ticks", "ended", "duty_max", "config_sha256", "estimator", "controller"]
     assert [run[key] for key in same] == [sim[key] for key in same]

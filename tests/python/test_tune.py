@@ -52,7 +52,7 @@ def test_tunings_are_compared_robot_by_robot():
 
 def test_a_design_that_misses_a_margin_is_not_flown(root, tmp_path):
     flights = Flights(
-        root / "build/host/equipoise", root / "config/mbbr.toml", [(0.0, 0.0)], 10.0, "full", tmp_path
+        root / "build/host/equipoise", root / "config/mbbr.toml", [(0.0, 0.0)], 10.0, "built2025", tmp_path
     )
     flights.check_margins([])
     with pytest.raises(NotFlown):

@@ -53,7 +53,7 @@ TEST_P(Campaign, NoFaultInAnyPhaseIsUnsafe) {
 /// 327 of the eduMIP have much play in their gears, which was taken for a lying encoder.
 TEST_P(Campaign, ASoundRobotIsNeitherDisarmedNorIsAnythingLeftOut) {
   const nlohmann::json sound =
-      result(GetParam(), "--fault torn_packet --fidelity full --robot 301 --robots 5");
+      result(GetParam(), "--fault torn_packet --fidelity built2025 --robot 301 --robots 5");
   EXPECT_EQ(sound["case_count"].get<int>(), 30);
   for (const nlohmann::json& each : sound["cases"]) {
     if (each["phase"] == "disarmed") continue;
@@ -85,7 +85,7 @@ TEST(RidesThrough, WhatWasTheEndBefore) {
   for (const Faulty& faulty : faults) {
     for (const int robot : faulty.robots) {
       const nlohmann::json ridden =
-          result(faulty.robot, std::string("--fidelity full --fault ") + faulty.fault + " --phase " +
+          result(faulty.robot, std::string("--fidelity built2025 --fault ") + faulty.fault + " --phase " +
                                    faulty.phase + " --robot " + std::to_string(robot));
       ASSERT_EQ(ridden["case_count"].get<int>(), 1);
       EXPECT_TRUE(ridden["cases"][0]["upright"].get<bool>()) << ridden["cases"][0].dump();
@@ -117,7 +117,7 @@ TEST(NotFooled, BySensorsThatLie) {
                               {"mbbr", "two_encoders_dead", "scheduled", "driving", {10, 82}}};
   for (const Lie& lie : lies) {
     for (const int robot : lie.robots) {
-      const nlohmann::json one = result(lie.robot, std::string("--fidelity full --fault ") + lie.fault +
+      const nlohmann::json one = result(lie.robot, std::string("--fidelity built2025 --fault ") + lie.fault +
                                                        " --controller " + lie.controller + " --phase " +
                                                        lie.phase + " --robot " + std::to_string(robot));
       ASSERT_EQ(one["case_count"].get<int>(), 1);
@@ -129,7 +129,7 @@ TEST(NotFooled, BySensorsThatLie) {
 /// Standing still they say no less than sound encoders do, until the robot is turned a little.
 TEST(TwoDeadEncoders, EndWithinHalfASecondOnARobotWithTwoWheels) {
   for (const char* controller : {"slc", "lqr"}) {
-    const nlohmann::json dead = result("edumip", std::string("--fidelity full --fault two_encoders_dead "
+    const nlohmann::json dead = result("edumip", std::string("--fidelity built2025 --fault two_encoders_dead "
                                                              "--robot 9621 --robots 10 --controller ") +
                                                      controller);
     int off = 0;
@@ -145,9 +145,10 @@ TEST(TwoDeadEncoders, EndWithinHalfASecondOnARobotWithTwoWheels) {
 }
 
 TEST(TwoDeadEncoders, AreNotSeenInSoundOnesThatStandStill) {
-  const nlohmann::json sound = result("edumip",
-                                      "--fidelity full --fault torn_packet --phase balancing --robot 9641 "
-                                      "--robots 6 --after-s 20");
+  const nlohmann::json sound =
+      result("edumip",
+             "--fidelity built2025 --fault torn_packet --phase balancing --robot 9641 "
+             "--robots 6 --after-s 20");
   EXPECT_EQ(sound["case_count"].get<int>(), 6);
   for (const nlohmann::json& each : sound["cases"]) {
     EXPECT_TRUE(each["upright"].get<bool>()) << each.dump();
@@ -156,9 +157,10 @@ TEST(TwoDeadEncoders, AreNotSeenInSoundOnesThatStandStill) {
 }
 
 TEST(TwoDeadEncoders, AreNotFoundBeforeTheRobotWasAsked) {
-  const nlohmann::json dead = result("edumip",
-                                     "--fidelity full --fault two_encoders_dead --phase balancing --robot "
-                                     "9650 --after-s 0.25");
+  const nlohmann::json dead =
+      result("edumip",
+             "--fidelity built2025 --fault two_encoders_dead --phase balancing --robot "
+             "9650 --after-s 0.25");
   EXPECT_TRUE(dead["cases"][0]["upright"].get<bool>()) << dead.dump();
 }
 

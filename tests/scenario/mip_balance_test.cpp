@@ -19,13 +19,14 @@ app::SimSummary run(const std::string& controller, double yaw_rate_rad_s, std::u
   return app::simulate<app::MipFirmware>(load_mip(kMip, set).config, choice, options, nullptr, never);
 }
 
-/// A robot of the population, in world `full` with what is set there.
+/// A robot of the population, in world `built2025` with what is set there.
 app::SimSummary run_drawn(std::int64_t robot, const std::string& controller, const app::SimOptions& options,
                           const std::vector<std::string>& set = {}) {
   static const std::atomic<bool> never{false};
-  const auto drawn = config::draw_robot(kMip, set, "full", robot);
-  return app::simulate<app::MipFirmware>(load_mip(kMip, config::with_robot_drawn(drawn, "full", set)).config,
-                                         {"ekf", controller, "full", false, "dmp"}, options, nullptr, never);
+  const auto drawn = config::draw_robot(kMip, set, "built2025", robot);
+  return app::simulate<app::MipFirmware>(
+      load_mip(kMip, config::with_robot_drawn(drawn, "built2025", set)).config,
+      {"ekf", controller, "built2025", false, "dmp"}, options, nullptr, never);
 }
 
 using Case = std::tuple<const char*, const char*, double>;  // controller, bridge, yaw rate
@@ -88,7 +89,7 @@ TEST(Mip, RecoversFromAPush) {
 TEST(Mip, RobotsAsBuiltTakeAPush) {
   const app::SimOptions options{{true, 0.0, 0.0}, 9.0, 1};
   for (const std::string force_N : {"1.0", "-2.0"}) {
-    const std::vector<std::string> push{"world.full.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, " +
+    const std::vector<std::string> push{"world.built2025.pushes=[{at_s=5.0, duration_s=0.05, force_N=[0.0, " +
                                         force_N + "]}]"};
     for (const char* controller : {"slc", "lqr"}) {
       for (std::int64_t robot = 2601; robot <= 2612; ++robot) {

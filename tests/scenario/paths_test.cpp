@@ -13,7 +13,7 @@ namespace {
 template <class Firmware>
 app::SimSummary fly(app::SimRequest request) {
   request.config = config_file<Firmware>();
-  request.choice.fidelity = "full";
+  request.choice.fidelity = "built2025";
   const auto loaded = app::load_for<Firmware>(&request);
   const std::atomic<bool> stop{false};
   return app::simulate<Firmware>(loaded.config, request.choice,

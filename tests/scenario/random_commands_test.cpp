@@ -90,7 +90,7 @@ void bypass_governor(Params& reference) {
 /// When and why the motors went off; empty: they did not.
 template <class Firmware, class Config>
 std::string loss(const Config& config, const Trials& t, std::uint64_t seed) {
-  auto world = Firmware::world(config, app::fidelity_level("full"), seed);
+  auto world = Firmware::world(config, app::fidelity_level("built2025"), seed);
   RandomPilot pilot(t.range, 1000U + seed, t.by_hand);
   return Firmware::with_pipeline(config, t.controller, [&](auto& pipeline) {
     app::PlantBackend backend(world);
@@ -111,7 +111,7 @@ std::string loss(const Config& config, const Trials& t, std::uint64_t seed) {
 
 template <class Firmware>
 int lost(const Trials& t) {
-  const app::Choice choice{Firmware::kDefaultEstimator, t.controller, "full"};
+  const app::Choice choice{Firmware::kDefaultEstimator, t.controller, "built2025"};
   auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), t.set).config, choice);
   if (!t.governed) bypass_governor(config.reference);
   const auto first = static_cast<std::uint64_t>(from_environment("EQUIPOISE_FIRST_SEQUENCE", 1));
@@ -145,7 +145,7 @@ TEST(RandomCommands, NoneByHandMakesARobotFall) {
 
 /// Of one sequence of the MBBR.
 std::string mbbr_loss(std::uint64_t sequence) {
-  const app::Choice choice{app::MbbrFirmware::kDefaultEstimator, "scheduled", "full"};
+  const app::Choice choice{app::MbbrFirmware::kDefaultEstimator, "scheduled", "built2025"};
   const auto config =
       app::MbbrFirmware::apply(app::MbbrFirmware::load(config_file<app::MbbrFirmware>(), {}).config, choice);
   return loss<app::MbbrFirmware>(config, {"scheduled", kMbbrRange}, sequence);

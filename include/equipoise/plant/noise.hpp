@@ -54,6 +54,17 @@ class StandardNormal {
   std::size_t next_ = kBlock;
 };
 
+/// Streams of random numbers; the numbers are part of what a seed means.
+enum NoiseEffect : std::uint64_t {
+  kStartNoise = 1,
+  kProcessNoise,
+  kGyroNoise,
+  kAccelNoise,
+  kEncoderNoise,
+  kAttitudeNoise,
+  kVibration
+};
+
 class NoiseStream {
  public:
   NoiseStream(std::uint64_t seed, std::uint64_t effect)

@@ -8,20 +8,11 @@
 
 #include "equipoise/plant/delay_line.hpp"
 #include "equipoise/plant/noise.hpp"
+#include "equipoise/plant/vibration.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
-
-/// Streams of random numbers; the numbers are part of what a seed means.
-enum NoiseEffect : std::uint64_t {
-  kStartNoise = 1,
-  kProcessNoise,
-  kGyroNoise,
-  kAccelNoise,
-  kEncoderNoise,
-  kAttitudeNoise
-};
 
 /// Quaternion (w, x, y, z) of Rz Ry Rx.
 std::array<double, 4> quaternion_of(const Vec3& theta_rad);
@@ -61,6 +52,7 @@ class SimulatedSensors {
   std::size_t wheels_;
   NoiseStream gyro_noise_, accel_noise_, encoder_noise_, attitude_noise_;
   Vec3 gyro_bias_, accel_bias_;
+  Vibration vibration_;
   bool misaligned_;
   bool aged_;
   bool encoder_noisy_;

@@ -1,7 +1,8 @@
 // What the simulated worlds of all robots share: parameters of sensors, battery, attitude packets and pushes.
 // Fidelity levels choose among them: `ideal` (rigid bodies, linear motors, perfect sensors), `thesis` (what
 // [T] section 6.3 simulated: friction and the filters' own noise), `nominal` (a robot as its model says, with
-// noise and drive/coast bridges), `full` (a robot as built: docs/disturbances.md). Simulation only.
+// noise and drive/coast bridges), `full` (a robot as built: docs/disturbances.md), `built2025` (what `full`
+// was before vibration, sills and slip). Simulation only.
 #pragma once
 
 #include <cmath>
@@ -11,12 +12,14 @@
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/imu_low_pass.h"
 #include "equipoise/plant/coulomb.hpp"
+#include "equipoise/plant/vibration.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise {
 
-enum class Fidelity { kIdeal, kThesis, kNominal, kFull };
+enum class Fidelity { kIdeal, kThesis, kNominal, kFull, kBuilt2025 };
+inline constexpr std::size_t kFidelities = 5;
 
 /// How the robot at hand differs from its model: factors on the plant alone; the firmware keeps its numbers.
 struct ActualScales {
@@ -50,6 +53,8 @@ struct WorldParams {
   double accel_bias_sigma_m_s2 = 0.0;
   double encoder_sigma_rad = 0.0;  // of the wheel angle
   bool quantise = false;           // encoders, IMU, ADC in whole counts; IMU range clipped
+
+  VibrationParams vibration;  // beside the chip's own noise
 
   double battery_V = 8.0;
   double battery_resistance_ohm = 0.0;

@@ -34,8 +34,8 @@ struct MbbrConfig {
   SafetyParams safety;
   AttitudeFilterParams attitude;
   Chain chain;
-  std::array<MbbrWorldParams, 4> world;      // by Fidelity
-  std::array<BridgeType, 4> world_bridge{};  // what the simulated robot is built with
+  std::array<MbbrWorldParams, kFidelities> world;      // by Fidelity
+  std::array<BridgeType, kFidelities> world_bridge{};  // what the simulated robot is built with
 
   MbbrThesisPipeline::Params thesis_pipeline() const;
   MbbrScheduledPipeline::Params scheduled_pipeline() const;

@@ -34,8 +34,8 @@ struct MipConfig {
   SafetyParams safety;
   AttitudeFilterParams attitude;
   Chain chain;
-  std::array<MipWorldParams, 4> world;       // by Fidelity
-  std::array<BridgeType, 4> world_bridge{};  // what the simulated robot is built with
+  std::array<MipWorldParams, kFidelities> world;       // by Fidelity
+  std::array<BridgeType, kFidelities> world_bridge{};  // what the simulated robot is built with
 
   MipSlcPipeline::Params slc_pipeline() const;
   MipLqrPipeline::Params lqr_pipeline() const;
