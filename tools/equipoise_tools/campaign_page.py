@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import shlex
+import subprocess
+from datetime import date
 from pathlib import Path
 
 import numpy as np
 
 from .campaign_statistics import influences, quantile_interval, survival_over_time, wilson
+from .paths import repository_root
 
 WORST = 12
 
@@ -166,6 +169,36 @@ def draw_pictures(rows: list[dict], out: Path) -> None:
         plt.close(figure)
 
 
+def made_by(rows: list[dict], settings: dict) -> str:
+    """The command that makes this page, with the commit and the day it was made."""
+    robots = sorted({row["robot"] for row in rows})
+    words = ["tools/campaign", "--config", settings["config"], "--engine", settings["engine"]]
+    words += ["--floor", settings["floor"]] if settings["floor"] != "calm" else []
+    words += ["--twins"] if settings["twins"] else []
+    words += [
+        "--fidelity",
+        settings["fidelity"],
+        "--first-robot",
+        str(robots[0]),
+        "--robots",
+        str(len(robots)),
+    ]
+    words += ["--runs", *(f"{yaw:g},{drive:g}" for yaw, drive in points_of(rows))]
+    words += ["--duration-s", f"{settings['duration_s']:g}"]
+    for key in ("estimator", "controller"):
+        words += [f"--{key}", settings[key]] if settings[key] else []
+    for text in settings["set"]:
+        words += ["--set", text]
+    commit = subprocess.run(
+        ["git", "-C", repository_root(), "rev-parse", "--short", "HEAD"],
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.strip()
+    made = f"Made by `{shlex.join(words)}`"
+    return f"{made} at {commit or 'no commit'}, {date.today()}; each robot's seed is its number."
+
+
 def engine_of(settings: dict) -> str:
     return f" in MuJoCo, {settings['floor']} floor" if settings.get("engine") == "mujoco" else ""
 
@@ -179,6 +212,8 @@ def page(rows: list[dict], settings: dict) -> str:
         f"`{settings['fidelity']}`{engine_of(settings)}, "
         f"{settings['duration_s']:g} s each; version {settings['version']}. "
         f"{len(rows) - len(fell)} upright to the end, {len(fell)} not.",
+        "",
+        made_by(rows, settings),
         "",
         *survival_table(rows),
         "",
