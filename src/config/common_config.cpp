@@ -138,6 +138,7 @@ ActualScales read_actual(Section s, bool has_ball) {
   scale("body_inertia_scale", &a.body_inertia);
   if (has_ball) scale("ball_mass_scale", &a.ball_mass);
   if (has_ball) scale("ball_radius_scale", &a.ball_radius);
+  if (!has_ball) scale("track_scale", &a.track);
   scale("wheel_radius_scale", &a.wheel_radius);
   scale("torque_scale", &a.torque);
   scale("back_emf_scale", &a.back_emf);
@@ -161,6 +162,28 @@ VibrationParams read_vibration(Section s) {
   return v;
 }
 
+FloorParams read_floor(Section s) {
+  FloorParams f;
+  f.wave_rad = s.number("wave_rad", 0.0, 0.3);
+  f.wave_m = s.number("wave_m", 0.01, 1e3);
+  f.sill_m = s.number("sill_m", 0.0, 0.01);
+  f.sill_every_m = s.number("sill_every_m", 0.01, 1e3);
+  f.joint_m = s.number("joint_m", 0.0, 0.01);
+  f.tile_m = s.number("tile_m", 0.01, 1e3);
+  f.heading_rad = s.number("heading_rad", -10.0, 10.0);
+  s.finish();
+  return f;
+}
+
+RandomPushes read_random_pushes(Section s) {
+  RandomPushes p;
+  p.every_s = s.number("every_s", 0.0, 1e6);
+  p.duration_s = s.number("duration_s", 1e-3, 10.0);
+  p.force_N = s.number("force_N", 0.0, 100.0);
+  s.finish();
+  return p;
+}
+
 void read_disturbance(Section& s, WorldParams* w) {
   w->stiction.static_ratio = s.number("static_ratio", 1.0, 5.0);
   w->stiction.rate_rad_s = s.number("stribeck_rate_rad_s", 1e-3, 100.0);
@@ -180,6 +203,23 @@ void read_disturbance(Section& s, WorldParams* w) {
   if (s.has("gyro_scale_error")) w->gyro_scale_error = s.vector<3>("gyro_scale_error", -0.2, 0.2);
   if (s.has("gyro_drift_rad_s")) w->gyro_drift_rad_s = s.vector<3>("gyro_drift_rad_s", -0.5, 0.5);
   w->warm_up_s = number_or(s, "warm_up_s", 60.0, 0.1, 1e4);
+  if (s.has("accel_scale_error")) w->accel_scale_error = s.vector<3>("accel_scale_error", -0.2, 0.2);
+  if (s.has("gyro_drift_rad_s_K")) {
+    w->gyro_drift_rad_s_K = s.vector<3>("gyro_drift_rad_s_K", -0.1, 0.1);
+    w->warm_K = s.number("warm_K", -100.0, 100.0);
+    w->warm_up_K = s.number("warm_up_K", -100.0, 100.0);
+  }
+  if (s.has("com_offset_rad")) w->com_offset_rad = s.vector<2>("com_offset_rad", -0.3, 0.3);
+  if (s.has("friction_scale")) {
+    w->friction_scale = s.vector<2>("friction_scale", 0.0, 10.0);
+    w->friction_time_s = s.number("friction_time_s", 0.1, 1e4);
+  }
+  if (s.has("bridge_on_delay_s")) {
+    w->bridge_on_delay_s = s.number("bridge_on_delay_s", 0.0, 1e-3);
+    w->bridge_off_delay_s = s.number("bridge_off_delay_s", 0.0, 1e-3);
+  }
+  w->missed_tick_share = number_or(s, "missed_tick_share", 0.0, 0.0, 0.5);
+  w->imu_repeat_share = number_or(s, "imu_repeat_share", 0.0, 0.0, 0.5);
 }
 
 }  // namespace
@@ -213,6 +253,8 @@ WorldParams read_world(Section s, BridgeType* bridge, const RobotsOwn& own) {
     w.pushes.push_back(push);
   }
   if (s.has("vibration")) w.vibration = read_vibration(s.table("vibration"));
+  if (s.has("floor")) w.floor = read_floor(s.table("floor"));
+  if (s.has("random_pushes")) w.random_pushes = read_random_pushes(s.table("random_pushes"));
   if (s.has("population")) s.table("population");  // read when a robot is drawn
   if (s.has("actual")) w.actual = read_actual(s.table("actual"), own.has_ball);
   if (s.has("disturbance")) {

@@ -11,10 +11,25 @@ std::array<double, 4> quaternion_of(const Vec3& theta) {
   return {q.w(), q.x(), q.y(), q.z()};
 }
 
+Mat3 turned_by(const Vec3& rotation_rad) noexcept {
+  const double angle = rotation_rad.norm();
+  return angle == 0.0 ? Mat3::Identity() : Eigen::AngleAxisd(angle, rotation_rad / angle).toRotationMatrix();
+}
+
 Vec2 push_force_W(const WorldParams& world, double time_s) noexcept {
   Vec2 force = Vec2::Zero();
   for (const Push& push : world.pushes) {
     if (time_s >= push.at_s && time_s < push.at_s + push.duration_s) force += push.force_W_N;
+  }
+  const RandomPushes& random = world.random_pushes;
+  const double interval = random.every_s > 0.0 ? std::floor(time_s / random.every_s) : 0.0;
+  if (interval >= 1.0) {
+    const auto k = static_cast<std::int64_t>(interval);
+    const double begins_at_s =
+        interval * random.every_s + hashed_unit(world.seed, k, 1) * (random.every_s - random.duration_s);
+    const double direction = 2.0 * kPi * hashed_unit(world.seed, k, 2);
+    if (time_s >= begins_at_s && time_s < begins_at_s + random.duration_s)
+      force += random.force_N * Vec2(std::cos(direction), std::sin(direction));
   }
   return force;
 }
@@ -34,10 +49,9 @@ SimulatedSensors::SimulatedSensors(const Calibration& calibration, const WorldPa
       heading_kick_rad_(world.attitude_heading_drift_rad_sqrt_s * std::sqrt(kTickS)) {
   aged_ = world.aged();
   encoder_noisy_ = world.encoder_sigma_rad != 0.0 || !world.quantise;  // else a zero's sign might differ
-  misaligned_ = !world.imu_misalignment_rad.isZero(0.0);
-  const double turn = world.imu_misalignment_rad.norm();
-  R_misaligned_ = misaligned_ ? Eigen::AngleAxisd(turn, world.imu_misalignment_rad / turn).toRotationMatrix()
-                              : Mat3::Identity();
+  const Vec3 chassis(world.com_offset_rad.x(), world.com_offset_rad.y(), 0.0);
+  misaligned_ = !world.imu_misalignment_rad.isZero(0.0) || !chassis.isZero(0.0);
+  R_misaligned_ = turned_by(chassis) * turned_by(world.imu_misalignment_rad);
   q_mounted_ = Mat3(R_misaligned_ * calibration.R_BS);
   gyro_bias_ = start.gaussian_vector<3>(world.gyro_bias_sigma_rad_s);
   accel_bias_ = start.gaussian_vector<3>(world.accel_bias_sigma_m_s2);
@@ -62,7 +76,15 @@ void SimulatedSensors::attitude_packet(const Vec3& theta_rad, RawSample* raw) {
 
 RawSample SimulatedSensors::sense(const TrueMotion& m) {
   const auto late = std::min(static_cast<std::size_t>(world_.sensor_latency_ticks), samples_);
-  const RawSample now = sense_now(aged_ ? as_felt(m) : m);
+  const double imu_sample = std::floor(m.time_s / imu_period_s());
+  const bool repeats = world_.imu_repeat_share > 0.0 && samples_ > 0 && imu_sample == imu_sample_;
+  imu_sample_ = imu_sample;
+  RawSample now = sense_now(aged_ ? as_felt(m) : m);
+  if (repeats) {
+    const RawSample& before = sampled_[(samples_ - 1) % kSampleDelay];
+    std::copy(std::begin(before.gyro_counts), std::end(before.gyro_counts), std::begin(now.gyro_counts));
+    std::copy(std::begin(before.accel_counts), std::end(before.accel_counts), std::begin(now.accel_counts));
+  }
   sampled_[samples_ % kSampleDelay] = now;
   RawSample raw = sampled_[(samples_ - late) % kSampleDelay];
   ++samples_;
@@ -76,8 +98,9 @@ TrueMotion SimulatedSensors::as_felt(const TrueMotion& m) noexcept {
            Eigen::Map<const Vec<kMaxMotors>>(m.wheel_angle_rad.data())};
   past_.add(now);
   TrueMotion felt = m;
-  felt.omega_B_rad_s = past_.value(m.time_s - world_.gyro_age_s(), &Felt::omega_B_rad_s);
-  felt.specific_force_B_m_s2 = past_.value(m.time_s - world_.accel_age_s(), &Felt::specific_force_B_m_s2);
+  const double imu_at_s = world_.imu_repeat_share > 0.0 ? imu_sample_ * imu_period_s() : m.time_s;
+  felt.omega_B_rad_s = past_.value(imu_at_s - world_.gyro_age_s(), &Felt::omega_B_rad_s);
+  felt.specific_force_B_m_s2 = past_.value(imu_at_s - world_.accel_age_s(), &Felt::specific_force_B_m_s2);
   const Vec<kMaxMotors> wheels = past_.value(m.time_s - world_.encoder_sample_age_s, &Felt::wheel_angle_rad);
   std::copy(wheels.begin(), wheels.end(), felt.wheel_angle_rad.begin());
   return felt;
@@ -92,13 +115,17 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
   Vec3 accel = as_mounted(m.specific_force_B_m_s2) + accel_bias_ +
                accel_noise_.gaussian_vector<3>(world_.accel_sigma_m_s2);
   if (world_.vibration.on()) {
-    const Vibration::Shaken shaken = vibration_.update(m.wheel_angle_rad);
+    const Vibration::Shaken shaken = vibration_.update(m.time_s, m.wheel_angle_rad);
     gyro += shaken.gyro_rad_s;
     accel += shaken.accel_m_s2;
   }
   gyro += world_.gyro_scale_error.cwiseProduct(gyro);
   if (!world_.gyro_drift_rad_s.isZero(0.0))
     gyro -= world_.gyro_drift_rad_s * std::expm1(-m.time_s / world_.warm_up_s);
+  if (!world_.gyro_drift_rad_s_K.isZero(0.0))
+    gyro += world_.gyro_drift_rad_s_K *
+            (world_.warm_K - world_.warm_up_K * std::expm1(-m.time_s / world_.warm_up_s));
+  accel += world_.accel_scale_error.cwiseProduct(accel);
 
   const auto counts = [this](double value, double per_count) {
     const double n = value / per_count;

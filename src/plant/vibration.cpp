@@ -40,12 +40,13 @@ Vibration::Vibration(const VibrationParams& p, std::uint64_t seed, std::size_t w
   }
 }
 
-Vibration::Shaken Vibration::update(const std::array<double, kMaxMotors>& wheel_angle_rad) {
+Vibration::Shaken Vibration::update(double time_s, const std::array<double, kMaxMotors>& wheel_angle_rad) {
   double rate_rad_s = 0.0;
   Vec<4 * kMaxMotors> phases = Vec<4 * kMaxMotors>::Zero();
   for (std::size_t wheel = 0; wheel < wheels_; ++wheel) {
     const double angle = wheel_angle_rad[wheel];
-    if (started_) rate_rad_s += std::abs(angle - angle_rad_[wheel]) / (kTickS * static_cast<double>(wheels_));
+    if (time_s_ >= 0.0 && time_s > time_s_)
+      rate_rad_s += std::abs(angle - angle_rad_[wheel]) / ((time_s - time_s_) * static_cast<double>(wheels_));
     angle_rad_[wheel] = angle;
     for (std::size_t line = 0; line < kLines; ++line) {
       const int at = static_cast<int>(2 * (kLines * wheel + line));
@@ -54,7 +55,7 @@ Vibration::Shaken Vibration::update(const std::array<double, kMaxMotors>& wheel_
       phases(at + 1) = std::cos(turned);
     }
   }
-  started_ = true;
+  time_s_ = time_s;
   const Vec6 plateau = plateau_(0) * before_ + plateau_(1) * before_that_ + noise_.gaussian_vector<6>(kick_);
   before_that_ = before_;
   before_ = plateau;

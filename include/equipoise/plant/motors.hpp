@@ -3,7 +3,9 @@
 // switches carry no current. Simulation only; no allocation.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/plant/diode_drop.hpp"
@@ -60,6 +62,14 @@ struct SupplyOf {
   }
 };
 
+/// Outputs of a bridge that switch on later than off lose that much of each period; at full duty none
+/// switches.
+inline double switched_duty(double duty, double lost) noexcept {
+  const double asked = std::abs(duty);
+  if (lost == 0.0 || asked == 0.0 || asked >= 1.0) return duty;
+  return std::copysign(std::clamp(asked - lost, 0.0, 1.0), duty);
+}
+
 template <int N>
 class SimulatedMotors {
  public:
@@ -69,14 +79,16 @@ class SimulatedMotors {
         supply_{world.battery_V,      world.battery_resistance_ohm, world.battery_V,
                 motor.resistance_ohm, motor.torque_constant_N_m_A,  world.actual.torque,
                 world.actual.back_emf},
-        diode_drop_V_(world.diode_drop_V) {
+        diode_drop_V_(world.diode_drop_V),
+        lost_duty_((world.bridge_on_delay_s - world.bridge_off_delay_s) * motor.pwm_hz) {
     supplied();
   }
 
   void command(const MotorCommand& command) noexcept {
     command_ = command;
     for (std::size_t i = 0; i < N; ++i) {
-      const double duty = calibration_.motor_sign[i] * command.duty[i];
+      command_.duty[i] = switched_duty(command.duty[i], lost_duty_);
+      const double duty = calibration_.motor_sign[i] * command_.duty[i];
       if (motor_.bridge == BridgeType::kDriveBrake) {
         bridges_.brake[i] = duty;
       } else if (diode_drop_V_ == 0.0) {
@@ -135,6 +147,7 @@ class SimulatedMotors {
   Calibration calibration_;
   SupplyOf<double, N> supply_;
   double diode_drop_V_;
+  double lost_duty_;
   double diodes_oppose_ = 1.0;
   MotorCommand command_{};
   BridgesOf<double, N> bridges_;

@@ -62,13 +62,27 @@ enum NoiseEffect : std::uint64_t {
   kAccelNoise,
   kEncoderNoise,
   kAttitudeNoise,
-  kVibration
+  kVibration,
+  kLoop
 };
+
+/// splitmix64: neighbouring numbers give unrelated ones.
+inline std::uint64_t mixed(std::uint64_t z) noexcept {
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
+  return z ^ (z >> 31);
+}
+/// In [0, 1), always the same for the same place.
+inline double hashed_unit(std::uint64_t seed, std::int64_t a, std::int64_t b) noexcept {
+  constexpr std::uint64_t kStep = 0x9E3779B97F4A7C15ULL;
+  const std::uint64_t first = mixed(seed * kStep + static_cast<std::uint64_t>(a));
+  return static_cast<double>(mixed(first * kStep + static_cast<std::uint64_t>(b)) >> 11) * 0x1p-53;
+}
 
 class NoiseStream {
  public:
   NoiseStream(std::uint64_t seed, std::uint64_t effect)
-      : engine_(mix(seed * 0x9E3779B97F4A7C15ULL + effect)) {}
+      : engine_(mixed(seed * 0x9E3779B97F4A7C15ULL + effect)) {}
 
   double gaussian(double sigma) { return sigma * normal_(engine_); }
   /// A stream that gives both kinds does not draw them in the order of the calls.
@@ -83,13 +97,6 @@ class NoiseStream {
   }
 
  private:
-  /// splitmix64: neighbouring seeds give unrelated streams.
-  static std::uint64_t mix(std::uint64_t z) noexcept {
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-    return z ^ (z >> 31);
-  }
-
   std::mt19937_64 engine_;
   StandardNormal normal_;
 };

@@ -17,6 +17,9 @@ namespace equipoise {
 /// Quaternion (w, x, y, z) of Rz Ry Rx.
 std::array<double, 4> quaternion_of(const Vec3& theta_rad);
 
+/// By a rotation vector.
+Mat3 turned_by(const Vec3& rotation_rad) noexcept;
+
 struct TrueMotion {
   double time_s = 0.0;
   Vec3 theta_rad = Vec3::Zero();  // roll, pitch, continuous yaw
@@ -45,6 +48,8 @@ class SimulatedSensors {
  private:
   TrueMotion as_felt(const TrueMotion& m) noexcept;
   RawSample sense_now(const TrueMotion& m);
+  /// Of its own clock.
+  double imu_period_s() const noexcept { return kTickS / (1.0 - world_.imu_repeat_share); }
   void attitude_packet(const Vec3& theta_rad, RawSample* raw);
 
   Calibration calibration_;
@@ -68,6 +73,7 @@ class SimulatedSensors {
   static constexpr std::size_t kSampleDelay = 4;
   std::array<RawSample, kSampleDelay> sampled_{};
   std::size_t samples_ = 0;
+  double imu_sample_ = 0.0;  // number of its last one
 };
 
 /// Sum of the pushes that act at `time_s`, N.

@@ -1,7 +1,7 @@
-// How wheels, rollers and gears shake gyro and accelerometer. In: wheel angles of each tick -> out: what is
-// added to both. A plateau (AR(2)) and lines that follow the wheels, in bursts: Gaussian times a log-normal
-// envelope. It grows with the wheels' rate w as w / (w + half rate); at rest there is none. Source: real
-// logs, docs/disturbances.md. Simulation only; allocates nothing; same seed, same bytes.
+// How wheels, rollers and gears shake gyro and accelerometer. In: time, wheel angles of each tick -> out:
+// what is added to both. A plateau (AR(2)) and lines that follow the wheels, in bursts: Gaussian times a
+// log-normal envelope. It grows with the wheels' rate w as w / (w + half rate); at rest there is none.
+// Source: real logs, docs/disturbances.md. Simulation only; allocates nothing; same seed, same bytes.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ class Vibration {
   struct Shaken {
     Vec3 gyro_rad_s, accel_m_s2;
   };
-  Shaken update(const std::array<double, kMaxMotors>& wheel_angle_rad);
+  Shaken update(double time_s, const std::array<double, kMaxMotors>& wheel_angle_rad);
 
  private:
   using Vec6 = Vec<6>;
@@ -50,7 +50,7 @@ class Vibration {
   double envelope_ = 0.0;                                          // its logarithm, in sigmas
   Mat<6, 4 * kMaxMotors> lines_ = Mat<6, 4 * kMaxMotors>::Zero();  // of sines and cosines, variance 1
   std::array<double, kMaxMotors> angle_rad_{};
-  bool started_ = false;
+  double time_s_ = -1.0;  // of the last tick; before the first: negative
 };
 
 }  // namespace equipoise

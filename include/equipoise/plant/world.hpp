@@ -12,6 +12,7 @@
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/imu_low_pass.h"
 #include "equipoise/plant/coulomb.hpp"
+#include "equipoise/plant/ground.hpp"
 #include "equipoise/plant/vibration.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "equipoise/types.hpp"
@@ -29,6 +30,7 @@ struct ActualScales {
   double ball_mass = 1.0;  // and the ball's inertia with it; MBBR
   double ball_radius = 1.0;
   double wheel_radius = 1.0;
+  double track = 1.0;     // distance of the two wheels; eduMIP
   double torque = 1.0;    // of every motor per unit of current
   double back_emf = 1.0;  // of every motor per rad/s
 };
@@ -38,6 +40,13 @@ struct Push {
   double at_s = 0.0;
   double duration_s = 0.05;
   Vec2 force_W_N = Vec2::Zero();
+};
+
+/// A push of this force in each interval, at a time and in a direction of its own; none in the first.
+struct RandomPushes {
+  double every_s = 0.0;  // 0: none
+  double duration_s = 0.05;
+  double force_N = 0.0;
 };
 
 struct WorldParams {
@@ -66,11 +75,17 @@ struct WorldParams {
   int attitude_latency_ticks = 0;
 
   std::vector<Push> pushes;
+  RandomPushes random_pushes;
+  FloorParams floor;
 
   /// What a robot has and its model leaves out; the defaults: nothing.
   Stiction stiction;
-  double diode_drop_V = 0.0;        // V_d of each of the two diodes that carry the current back; drive/coast
-  int actuation_latency_steps = 0;  // until the bridges follow
+  Vec2 friction_scale = Vec2::Ones();  // of Coulomb friction: at the start, and where it goes
+  double friction_time_s = 20.0;       // with this time constant
+  double diode_drop_V = 0.0;       // V_d of each of the two diodes that carry the current back; drive/coast
+  double bridge_on_delay_s = 0.0;  // of the bridges' outputs: what they lose of each period is the difference
+  double bridge_off_delay_s = 0.0;
+  int actuation_latency_steps = 0;     // until the bridges follow
   double actuation_delay_ticks = 0.0;  // beside the latency: where in the tick the PWM takes the new duty
   int sensor_latency_ticks = 0;        // of a whole sample
   /// Age of each sensor within its sample: the IMU's low pass by its register (0: none), and sampling
@@ -80,27 +95,42 @@ struct WorldParams {
   double imu_sample_age_s = 0.0;
   double encoder_sample_age_s = 0.0;
   Vec3 imu_misalignment_rad = Vec3::Zero();  // rotation vector, body axes: mount against calibration
-  Vec3 gyro_scale_error = Vec3::Zero();      // of each sensor axis
-  Vec3 gyro_drift_rad_s = Vec3::Zero();      // bias that warming up adds in the end
-  double warm_up_s = 60.0;                   // its time constant
-  Vec2 floor_slope_rad = Vec2::Zero();       // rise towards world x, y
-  double rolling_resistance = 0.0;           // of the weight
+  Vec2 com_offset_rad = Vec2::Zero();    // mass centre off the chassis' axis: the chassis hangs this far over
+  Vec3 gyro_scale_error = Vec3::Zero();  // of each sensor axis
+  Vec3 accel_scale_error = Vec3::Zero();   // the same
+  Vec3 gyro_drift_rad_s = Vec3::Zero();    // bias that warming up adds in the end
+  double warm_up_s = 60.0;                 // its time constant
+  Vec3 gyro_drift_rad_s_K = Vec3::Zero();  // bias per kelvin above the calibration's temperature
+  double warm_K = 0.0;                     // that much at the start
+  double warm_up_K = 0.0;                  // that much more in the end
+  double missed_tick_share = 0.0;          // of the loop's ticks
+  double imu_repeat_share = 0.0;           // of the ticks: the IMU's clock is slower than the loop's
+  Vec2 floor_slope_rad = Vec2::Zero();     // rise towards world x, y
+  double rolling_resistance = 0.0;         // of the weight
   ActualScales actual;
 
   /// A level floor, nobody who pushes, bridges that follow at once and drop nothing, sensors of now.
   bool plain() const noexcept {
-    return pushes.empty() && floor_slope_rad.isZero(0.0) && rolling_resistance == 0.0 &&
-           stiction.static_ratio == 1.0 && diode_drop_V == 0.0 && actuation_steps() == 0.0 && !aged();
+    return pushes.empty() && random_pushes.every_s == 0.0 && !floor.uneven() && floor_slope_rad.isZero(0.0) &&
+           rolling_resistance == 0.0 && stiction.static_ratio == 1.0 && friction_scale == Vec2::Ones() &&
+           diode_drop_V == 0.0 && bridge_on_delay_s == bridge_off_delay_s && actuation_steps() == 0.0 &&
+           missed_tick_share == 0.0 && com_offset_rad.isZero(0.0) && !aged();
   }
   /// A sensor reports the past.
   bool aged() const noexcept {
-    return gyro_age_s() > 0.0 || accel_age_s() > 0.0 || encoder_sample_age_s > 0.0;
+    return imu_repeat_share > 0.0 || gyro_age_s() > 0.0 || accel_age_s() > 0.0 || encoder_sample_age_s > 0.0;
   }
   double gyro_age_s() const noexcept {
     return imu_sample_age_s + (imu_low_pass > 0 ? imu_delay_scale * imu_gyro_delay_s(imu_low_pass) : 0.0);
   }
   double accel_age_s() const noexcept {
     return imu_sample_age_s + (imu_low_pass > 0 ? imu_delay_scale * imu_accel_delay_s(imu_low_pass) : 0.0);
+  }
+  /// Coulomb friction over the configured one.
+  double friction_now(double time_s) const noexcept {
+    if (friction_scale.x() == friction_scale.y()) return friction_scale.x();
+    return friction_scale.y() +
+           (friction_scale.x() - friction_scale.y()) * std::exp(-time_s / friction_time_s);
   }
   /// When in a tick the bridges take their command, in steps.
   double actuation_steps() const noexcept {

@@ -48,13 +48,14 @@ MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p)
       ratio_(robot.r / robot.r_w),
       wheel_radius_m_(robot.r_w),
       grip_N_m_(Vec3::Constant(grip_limit_N_m(p.wheel_grip, robot))),
-      contacts_(wheel_contacts(robot)),
+      hung_(turned_by(Vec3(p.com_offset_rad.x(), p.com_offset_rad.y(), 0.0))),
+      contacts_(hung_ * wheel_contacts(robot)),
       loads_from_force_(contacts_.inverse()),
-      middle_(std::cos(p.roller_tilt_rad) * kinematics_.T_ob()),
+      middle_(std::cos(p.roller_tilt_rad) * hung_ * kinematics_.T_ob()),
       to_row_(std::sin(p.roller_tilt_rad) * contacts_),
-      tilted_(kinematics_.T_ob()) {
+      tilted_(hung_ * kinematics_.T_ob()) {
   for (int i = 0; i < Mbbr::kWheels; ++i) {
-    const Vec3 axis = kinematics_.T_ob().col(i);
+    const Vec3 axis = tilted_.col(i);
     pushes_.col(i) = axis.cross(Vec3(contacts_.col(i)));
   }
 }

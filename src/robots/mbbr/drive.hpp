@@ -8,6 +8,7 @@
 
 #include "equipoise/plant/gear_play.hpp"
 #include "equipoise/plant/motors.hpp"
+#include "equipoise/plant/sensors.hpp"
 #include "robots/mbbr/mbbr.hpp"
 
 namespace equipoise {
@@ -20,11 +21,12 @@ struct MbbrDriveParams {
   double roller_slip_N_m = 0.0;         // micro-slip: torque ripple of a wheel as rollers pass
   double wheel_grip = 0.0;              // friction coefficient at the ball; 0: wheels never slip
   double gearbox_friction_share = 0.0;  // of the drive's friction that sits before the contact
+  Vec2 com_offset_rad = Vec2::Zero();   // the wheels hang this far over
 
   /// Motors, wheels and gears are as drawn.
   bool even() const noexcept {
     return wheel_torque_scale == Vec3::Ones() && gear.play_rad == 0.0 && roller_tilt_rad == 0.0 &&
-           roller_slip_N_m == 0.0 && wheel_grip == 0.0;
+           roller_slip_N_m == 0.0 && wheel_grip == 0.0 && com_offset_rad.isZero(0.0);
   }
 };
 
@@ -68,7 +70,7 @@ class MbbrDrive {
   Vec3 encoder_offset_rad() const noexcept;
 
  private:
-  bool tilts() const noexcept { return p_.roller_tilt_rad != 0.0; }
+  bool tilts() const noexcept { return p_.roller_tilt_rad != 0.0 || !p_.com_offset_rad.isZero(0.0); }
   Vec3 wheel_rates(const Vec3& relative_rate_B) const noexcept;
   /// Motor less the friction before it.
   Vec3 contact_torques(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept;
@@ -78,6 +80,7 @@ class MbbrDrive {
   double ratio_;
   double wheel_radius_m_;
   Vec3 grip_N_m_;  // of each wheel under its load
+  Mat3 hung_;      // chassis to body axes, whose z points at the mass centre
   Mat3 contacts_;  // normals, columns
   Mat3 pushes_;    // directions in which the wheels push the ball, columns
   Mat3 loads_from_force_;

@@ -18,6 +18,12 @@ Vec<16> start_state(NoiseStream& noise, double sigma) {
   return s;
 }
 
+MbbrDriveParams with_offset(const MbbrWorldParams& world) {
+  MbbrDriveParams drive = world.drive;
+  drive.com_offset_rad = world.common.com_offset_rad;
+  return drive;
+}
+
 }  // namespace
 
 MbbrParameters as_built(MbbrParameters p, const ActualScales& actual) noexcept {
@@ -43,13 +49,16 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       dynamics_(robot_),
       mobility_(dynamics_.relative_mobility()),
       motors_(motor, calibration, world.common),
-      drive_(robot_, world.drive),
+      drive_(robot_, with_offset(world)),
       floor_(robot_, world.floor),
+      ground_(world.common.floor, robot_.r, world.common.seed),
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
+      loop_noise_(world.common.seed, kLoop),
       s_(start_state(start_noise_, world.common.initial_tilt_rad)),
       here_(s_),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)),
+      uneven_(world.common.floor.uneven()),
       plain_(world.common.plain() && world.drive.even() && !floor_.limited()) {}
 
 MbbrWorld::Here MbbrWorld::near(const State& s) const noexcept {
@@ -74,6 +83,7 @@ Vec2 MbbrWorld::pull_star(const Instant& now) const noexcept {
   const double weight_N = (robot_.m_t + robot_.m_b) * kGravity_m_s2;
   const Vec2& slope = world_.common.floor_slope_rad;
   if (!slope.isZero(0.0)) pull = now.heading.back(-weight_N * slope);
+  if (uneven_) pull += (robot_.m_t + robot_.m_b) * now.heading.back(ground_.pull_W_m_s2());
   if (world_.common.rolling_resistance != 0.0) {
     const Vec2 v = ball_velocity(robot_.r, now.motion.phi_dot_star);
     pull -= world_.common.rolling_resistance * weight_N * v / std::max(v.norm(), kRollingStart_m_s);
@@ -118,7 +128,7 @@ MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const Here& now,
 
 Vec3 MbbrWorld::friction_limit_B(const Instant& now) const noexcept {
   if (!world_.common.friction) return Vec3::Zero();
-  return friction_limit_N_m(world_, robot_.mu_c, now.relative_B);
+  return friction_limit_N_m(world_, robot_.mu_c * world_.common.friction_now(time_s_), now.relative_B);
 }
 
 /// Per axis, the constant torque that would end this step at rest, limited to friction's: sticking and
@@ -136,12 +146,19 @@ MbbrFriction MbbrWorld::slip_friction(const State& s, const Instant& free, doubl
   const State next = s + h * slip_derivative(s, free, a);
   Vec<6> rates;
   rates << near(next).relative_B, next.segment<3>(kSlip);
-  const double normal = floor_.needed(free.motion, free.loads, felt_as_rolling(a, robot_.r)).normal_N;
+  const double normal = needed(free, felt_as_rolling(a, robot_.r)).normal_N;
   return floor_.friction(free.motion, mass, rates, h, friction_limit_B(free), normal);
 }
 
+/// What the floor must carry; one that lifts the robot carries more.
+MbbrFloorForce MbbrWorld::needed(const Instant& now, const MbbrAccelerations& a) const noexcept {
+  MbbrFloorForce f = floor_.needed(now.motion, now.loads, a);
+  f.normal_N += (robot_.m_t + robot_.m_b) * ground_.lift_m_s2();
+  return f;
+}
+
 Felt MbbrWorld::felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
-  return felt(m.omega_B, -dynamics_.accelerometer_B(m, a));
+  return felt(m.omega_B, -dynamics_.accelerometer_B(m, a) + ground_.lift_m_s2() * m.R().row(2).transpose());
 }
 
 Felt MbbrWorld::felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept {
@@ -180,6 +197,11 @@ void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const Mb
 }
 
 void MbbrWorld::step(double h) noexcept {
+  if (uneven_) {
+    const Vec2 slip = s_.segment<2>(kSlip);
+    ground_.begin_step(ball_velocity(robot_.r, Vec2(s_.segment<2>(kPhi))),
+                       here_.heading(Vec2(ball_velocity(robot_.r, here_.motion.phi_dot_star) + slip)), h);
+  }
   drive_.begin_step(motors_, here_.relative_B, kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
   const Vec2 push = push_now();
   Instant free(here_);
@@ -187,7 +209,7 @@ void MbbrWorld::step(double h) noexcept {
   if (!slipping_) {
     friction_.axes_B = coulomb_torque_B(free);
     const Instant now = free.with_friction(dynamics_, wheels(), friction_.axes_B);
-    slipping_ = floor_.limited() && !floor_.carries(floor_.needed(now.motion, now.loads, now.a));
+    slipping_ = floor_.limited() && !floor_.carries(needed(now, now.a));
     if (!slipping_) {
       if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
       load_wheels(now, friction_.axes_B, now.a, h);
@@ -223,6 +245,12 @@ void MbbrWorld::step(double h) noexcept {
 }
 
 void MbbrWorld::advance(const MotorCommand& command) {
+  advance_tick(command);
+  const double missed = world_.common.missed_tick_share;
+  if (missed > 0.0 && loop_noise_.uniform(0.0, 1.0) < missed) advance_tick(command);
+}
+
+void MbbrWorld::advance_tick(const MotorCommand& command) {
   if (command.enable) held_ = false;
   rolled_ = false;
   const double h = world_.common.step_s;

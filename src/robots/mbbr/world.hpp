@@ -83,6 +83,8 @@ class MbbrWorld {
   Vec3 coulomb_torque_B(const Instant& free) const noexcept;
   MbbrFriction slip_friction(const State& s, const Instant& free, double h) const noexcept;
   Vec2 pull_star(const Instant& now) const noexcept;
+  MbbrFloorForce needed(const Instant& now, const MbbrAccelerations& a) const noexcept;
+  void advance_tick(const MotorCommand& command);
   Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
   Felt felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
   Felt felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept;
@@ -101,10 +103,12 @@ class MbbrWorld {
   MbbrDrive::Motors motors_;
   MbbrDrive drive_;
   MbbrSlipping floor_;
-  NoiseStream start_noise_, process_noise_;
+  Ground ground_;
+  NoiseStream start_noise_, process_noise_, loop_noise_;
   State s_;
   Here here_;  // at s_
   SimulatedSensors sensors_;
+  bool uneven_;
   bool plain_;  // as MbbrRollingOf has it
   double time_s_ = 0.0;
   bool held_ = true;

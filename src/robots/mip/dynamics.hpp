@@ -37,6 +37,11 @@ class MipDynamicsOf {
   /// theta.
   VecOf<Real, 3> accelerations(const MipMotionOf<Real>& m, const TurnOf<Real>& tilt, const Real& tau_sum,
                                const Real& tau_difference) const noexcept;
+  /// About the vertical, of body and wheels; `s`: sine of theta.
+  Real yaw_inertia(const Real& s) const noexcept {
+    const Real C = p_.I_b2 - p_.I_b3 + 2.0 * (p_.I_w2 - p_.I_w3) + p_.l * (p_.l * p_.m_b);
+    return p_.I_b3 + 2.0 * p_.I_w3 + C * s * s + 0.5 * p_.d * p_.d * (p_.I_w1 / (p_.r * p_.r) + p_.m_w);
+  }
   const Real& wheel_radius_m() const noexcept { return p_.r; }
 
  private:
@@ -56,8 +61,7 @@ VecOf<Real, 3> MipDynamicsOf<Real>::accelerations(const MipMotionOf<Real>& m, co
   const Real m11 = p_.I_b1 + p_.l * lm + 2.0 * lm * p_.r * c + wheels;
   const Real m12 = wheels + lm * p_.r * c;
   const Real m22 = wheels;
-  const Real m33 =
-      p_.I_b3 + 2.0 * p_.I_w3 + C * s * s + 0.5 * p_.d * p_.d * (p_.I_w1 / (p_.r * p_.r) + p_.m_w);
+  const Real m33 = yaw_inertia(s);
 
   const Real b1 =
       s * (C * c * m.psi_dot * m.psi_dot + lm * (kGravity_m_s2 + p_.r * m.theta_dot * m.theta_dot));

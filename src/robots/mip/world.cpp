@@ -38,6 +38,7 @@ MipParameters as_built(MipParameters p, const ActualScales& actual) noexcept {
   p.I_b2 *= actual.body_inertia;
   p.I_b3 *= actual.body_inertia;
   p.r *= actual.wheel_radius;
+  p.d *= actual.track;
   const double square = actual.wheel_radius * actual.wheel_radius;  // the same mass on a larger wheel
   p.I_w1 *= square;
   p.I_w2 *= square;
@@ -64,10 +65,14 @@ MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, con
       kinematics_(robot_),
       dynamics_(robot_),
       motors_(motor, calibration, world.common),
+      ground_{Ground(world.common.floor, robot_.r, world.common.seed),
+              Ground(world.common.floor, robot_.r, world.common.seed)},
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
+      loop_noise_(world.common.seed, kLoop),
       now_(start(robot_, world, start_noise_)),
       sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s()(kTheta), 0.0, s()(kPsi))),
+      uneven_(world.common.floor.uneven()),
       plain_(world.common.plain() && world.lift_at_s < 0.0) {
   Eigen::Map<Mat<2, 2>>(now_.mobility) = wheel_mobility(robot_);
 }
@@ -81,15 +86,15 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
   const Vec2 push_W = push_force_W(world_.common, time_s_);
   const Vec2& slope = world_.common.floor_slope_rad;
   const double resistance = world_.common.rolling_resistance;
-  if (!push_W.isZero(0.0) || !slope.isZero(0.0) || resistance != 0.0) {
+  if (!push_W.isZero(0.0) || !slope.isZero(0.0) || resistance != 0.0 || uneven_) {
     // Force along the rolling direction at the centre of mass: power F (r (phi' + theta') + l cos theta'),
     // with the axle's speed along -y. On a slope the whole weight pulls the axle downhill.
-    const Vec2 weight_W = -(robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2 * slope;
+    const Vec2 weight_W = -weight_kg() * kGravity_m_s2 * slope;
     const double forward = -facing.heading.back(push_W).y();
     const double speed = robot_.r * (s(kPhiDot) + s(kThetaDot));  // along the rolling direction
-    const double weight_N = (robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2;
+    const double weight_N = weight_kg() * kGravity_m_s2;
     const double held_back = resistance * weight_N * speed / std::max(std::abs(speed), kRollingStart_m_s);
-    const double downhill = -facing.heading.back(weight_W).y() - held_back;
+    const double downhill = -facing.heading.back(weight_W).y() - held_back + ground_N_(0);
     const double c = facing.tilt.cosine();
     const double lm = robot_.l * robot_.m_b;
     const double m22 = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;
@@ -100,14 +105,33 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
     const double f2 = (forward + downhill) * robot_.r;
     a(0) += (m22 * f1 - m12 * f2) / det;
     a(1) += (m11 * f2 - m12 * f1) / det;
+    // The first wheel, at +x, pushed along -y turns the robot back.
+    a(2) -= 0.5 * robot_.d * ground_N_(1) / dynamics_.yaw_inertia(facing.tilt.sine());
   }
   return a;
 }
 
 Vec2 MipWorld::friction_limit(const Vec2& wheel_rates) const noexcept {
   const Stiction& stiction = world_.common.stiction;
-  return {now_.coulomb_N_m[0] * stiction.factor(wheel_rates.x()),
-          now_.coulomb_N_m[1] * stiction.factor(wheel_rates.y())};
+  const double scale = world_.common.friction_now(time_s_);
+  return {scale * now_.coulomb_N_m[0] * stiction.factor(wheel_rates.x()),
+          scale * now_.coulomb_N_m[1] * stiction.factor(wheel_rates.y())};
+}
+
+/// Each wheel carries half the weight over the floor where it is.
+void MipWorld::feel_ground(double h) noexcept {
+  const Turn heading(s()(kPsi));
+  const double speed =
+      lifted() ? 0.0 : -robot_.r * (s()(kPhiDot) + s()(kThetaDot));  // along the yaw frame's y
+  Vec2 forward_N;
+  for (int i = 0; i < Mip::kWheels; ++i) {
+    const double side = i == 0 ? 0.5 * robot_.d : -0.5 * robot_.d;
+    Ground& ground = ground_[static_cast<std::size_t>(i)];
+    ground.begin_step(s().segment<2>(kPosition) + heading(Vec2(side, 0.0)),
+                      heading(Vec2(0.0, speed + side * s()(kPsiDot))), h);
+    forward_N(i) = -0.5 * weight_kg() * heading.back(ground.pull_W_m_s2()).y();
+  }
+  ground_N_ = Vec2(forward_N.sum(), forward_N(0) - forward_N(1));
 }
 
 void MipWorld::disturb() {
@@ -128,6 +152,8 @@ Felt MipWorld::felt(const Vec3& accelerations) const noexcept {
     felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(
         {s()(kTheta), s()(kThetaDot), s()(kPhiDot), s()(kPsiDot)}, accelerations, from_com);
   }
+  const double lift = 0.5 * (ground_[0].lift_m_s2() + ground_[1].lift_m_s2());
+  felt.specific_force_B_m_s2 += lift * Vec3(0.0, sin, cos);
   felt.wheel_angle_rad.head<2>() =
       kinematics_.wheels(s()(kPhi), s()(kPsi)) + Vec2(now_.gears[0].ahead_rad(), now_.gears[1].ahead_rad());
   return felt;
@@ -138,6 +164,7 @@ void MipWorld::step(double h) noexcept {
     now_.state[kThetaDot] = now_.state[kTheta] < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
     now_.state[kPsiDot] = 0.0;
   }
+  if (uneven_) feel_ground(h);
   equipoise::step(
       &now_, Body{*this}, Facing(s()), world_.common.step_s, h,
       [this](const Vec2& rates) { return motors_.torque(rates); },
@@ -149,6 +176,12 @@ void MipWorld::step(double h) noexcept {
 }
 
 void MipWorld::advance(const MotorCommand& command) {
+  advance_tick(command);
+  const double missed = world_.common.missed_tick_share;
+  if (missed > 0.0 && loop_noise_.uniform(0.0, 1.0) < missed) advance_tick(command);
+}
+
+void MipWorld::advance_tick(const MotorCommand& command) {
   if (command.enable) held_ = false;
   const double h = world_.common.step_s;
   const int steps = steps_per_tick();

@@ -77,8 +77,11 @@ class MipWorld {
   Eigen::Map<const State> s() const noexcept { return Eigen::Map<const State>(now_.state); }
   Vec3 accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept;
   Vec2 friction_limit(const Vec2& wheel_rates) const noexcept;
+  void feel_ground(double h) noexcept;
+  double weight_kg() const noexcept { return robot_.m_b + 2.0 * robot_.m_w; }
   Felt felt(const Vec3& accelerations) const noexcept;
   void step(double h) noexcept;
+  void advance_tick(const MotorCommand& command);
   void disturb();
   void end_tick() noexcept;
   bool lifted() const noexcept { return world_.lift_at_s >= 0.0 && time_s_ >= world_.lift_at_s; }
@@ -88,9 +91,12 @@ class MipWorld {
   MipKinematics kinematics_;
   MipDynamics dynamics_;
   SimulatedMotors<Mip::kWheels> motors_;
-  NoiseStream start_noise_, process_noise_;
+  std::array<Ground, Mip::kWheels> ground_;  // at +x and at -x of the axle
+  Vec2 ground_N_ = Vec2::Zero();  // forward force of both over this step, and of the first less the other
+  NoiseStream start_noise_, process_noise_, loop_noise_;
   MipRollingOf<double> now_;
   SimulatedSensors sensors_;
+  bool uneven_;
   bool plain_;  // as MipRollingOf has it
   double time_s_ = 0.0;
   bool held_ = true;

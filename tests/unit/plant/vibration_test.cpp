@@ -22,7 +22,7 @@ std::vector<double> run(const VibrationParams& p, double rate_rad_s, int ticks) 
   std::vector<double> x;
   for (int i = 0; i < ticks; ++i) {
     const double angle = rate_rad_s * kTickS * i;
-    const double value = vibration.update({angle, -angle, angle, 0.0}).gyro_rad_s.x();
+    const double value = vibration.update(kTickS * i, {angle, -angle, angle, 0.0}).gyro_rad_s.x();
     if (i > 0) x.push_back(value);
   }
   return x;
