@@ -1,0 +1,47 @@
+"""Windows of noise are told apart where they differ, and only there; a real log beside the population."""
+
+import numpy as np
+import pytest
+from equipoise_tools import noise_comparison
+
+
+def noise(seed, sigma=0.01, keep=0.0, seconds=30):
+    rng = np.random.default_rng(seed)
+    white = rng.normal(size=(seconds * noise_comparison.HZ, 6))
+    coloured = white.copy()
+    for i in range(1, len(white)):
+        coloured[i] = keep * coloured[i - 1] + np.sqrt(1.0 - keep**2) * white[i]
+    return sigma * coloured
+
+
+def test_area_under_the_curve_is_the_share_of_pairs_in_order():
+    scores = np.array([3.0, 1.0, 2.0, 0.0])
+    assert noise_comparison.area_under_curve(scores, np.array([True, True, False, False])) == 0.75
+
+
+def test_the_same_noise_is_not_told_apart():
+    f = noise_comparison.features
+    assert 0.3 < noise_comparison.told_apart(f(noise(1)), f(noise(2))) < 0.7
+
+
+@pytest.mark.parametrize("other", [{"sigma": 0.02}, {"keep": -0.6}])
+def test_noise_of_another_size_or_colour_is_told_apart(other):
+    f = noise_comparison.features
+    assert noise_comparison.told_apart(f(noise(1)), f(noise(2, **other))) > 0.95
+
+
+def test_real_noise_lies_within_a_factor_of_the_population(root):
+    log = root.parent / "shared/real/pichim+Mini_Segway/docs/matlab/LOG278.TXT"
+    if not log.exists():
+        pytest.skip("../shared/real is not there: real logs are not part of the project")
+    binary = root / "build/host/equipoise"
+    made = [
+        noise_comparison.simulated_motions(binary, root / "config/edumip.toml", robot)
+        for robot in (1, 2, 3, 4)
+    ]
+    result = noise_comparison.compare(noise_comparison.real_motions(log), made)
+    # The chip at rest and the robot standing: a gross error of unit, frame or shape is a factor of ten.
+    for motion in ("rest", "standing"):
+        for axis, row in result[motion]["quantities"].items():
+            assert row["outside_by"] < 5.0, (motion, axis, row)
+    assert 0.5 <= result["standing"]["auc"] <= 1.0

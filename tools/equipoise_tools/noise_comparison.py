@@ -1,0 +1,186 @@
+"""Noise of gyro and accelerometer: a real log beside simulated eduMIPs of the population.
+
+At rest, standing and rolling: per quantity the real value and the simulated range, and how well a linear
+discriminant tells windows of one second apart (area under its ROC curve, 0.5: not at all). The real log:
+pichim/Mini_Segway, docs/matlab/LOG278.TXT.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+import numpy as np
+from equipoise_robot import channels as ch
+from equipoise_robot.log import Log
+from scipy.linalg import cho_factor, cho_solve
+from scipy.signal import butter, sosfiltfilt
+from scipy.stats import kurtosis, rankdata
+
+from .paths import repository_root
+
+HZ = 200
+HIGH_PASS_HZ = 20.0
+AXES = [f"{sensor} {axis}" for sensor in ("gyro", "accelerometer") for axis in "xyz"]
+LOGGED_HZ, FILTER_HZ = 1000, 60.0  # of LOG278; the robot passed its samples through a first-order filter
+MOTIONS = {
+    "rest": (0.1, 2.0),
+    "standing": (14.8, 20.2),
+    "rolling": (2.9, 5.4),
+}  # s; rolling: on casters
+ROLLING_M_S = 0.3
+
+
+def segway(path: Path) -> np.ndarray:
+    """Gyro, rad/s, and accelerometer, m/s^2, as the chip gave them: the robot's filter is taken back."""
+    raw = path.read_bytes()
+    columns = raw[0]
+    values = np.frombuffer(raw[1:], "<f4")
+    values = values[: values.size // columns * columns].reshape(-1, columns).astype(float)
+    filtered = values[:, 9:15]
+    gain = 1.0 - np.exp(-2.0 * np.pi * FILTER_HZ / LOGGED_HZ)
+    chip: np.ndarray = np.vstack([filtered[:1], (filtered[1:] - (1.0 - gain) * filtered[:-1]) / gain])
+    return chip
+
+
+def real_motions(path: Path) -> dict[str, np.ndarray]:
+    picked = segway(path)[:: LOGGED_HZ // HZ]  # as a loop of 200 Hz reads it
+    return {name: picked[int(HZ * begin) : int(HZ * end)] for name, (begin, end) in MOTIONS.items()}
+
+
+def simulated(binary: Path, config: Path, robot: int, *, drive_mps: float, duration_s: float) -> np.ndarray:
+    """The same of a robot of the population; each has its own seed."""
+    with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
+        log = Path(folder) / "run.lcm"
+        command = f"sim --config {config} --fidelity full --robot {robot} --seed {robot} --telemetry off"
+        # How it shakes is asked, not who falls: nothing is judged.
+        command += f" --estimator truth --set safety.detection=false --log {log}"
+        command += f" --drive-mps {drive_mps} --duration-s {duration_s} --json -"
+        subprocess.run([str(binary), *command.split()], capture_output=True, check=False)
+        records = Log(log)[ch.SENSORS]
+    calibration = tomllib.loads(config.read_text())["calibration"]
+    turned = np.reshape(calibration["R_BS"], (3, 3)).T
+    gyro = records["gyro_counts"] / calibration["gyro_counts_per_deg_s"] * np.pi / 180.0
+    accel = records["accel_counts"] / calibration["accel_counts_per_g"] * 9.81
+    return np.hstack([gyro @ turned, accel @ turned])
+
+
+def simulated_motions(binary: Path, config: Path, robot: int) -> dict[str, np.ndarray]:
+    standing = simulated(binary, config, robot, drive_mps=0.0, duration_s=12.0)
+    rolling = simulated(binary, config, robot, drive_mps=ROLLING_M_S, duration_s=12.0)
+    return {"rest": standing[: HZ // 2], "standing": standing[3 * HZ :], "rolling": rolling[5 * HZ :]}
+
+
+def whole(motions: dict[str, np.ndarray]) -> bool:
+    """Neither run was cut short by a fall."""
+    return all(len(motions[name]) >= 2 * HZ for name in ("standing", "rolling"))
+
+
+def high_passed(samples: np.ndarray) -> np.ndarray:
+    out: np.ndarray = sosfiltfilt(butter(4, HIGH_PASS_HZ, "high", fs=HZ, output="sos"), samples, axis=0)
+    return out
+
+
+def features(samples: np.ndarray) -> np.ndarray:
+    """Of each window of a second, half overlapping: logarithm of sigma, lag-1 correlation, tails."""
+    noise = high_passed(samples)
+    rows = []
+    for begin in range(0, len(noise) - HZ + 1, HZ // 2):
+        x = noise[begin : begin + HZ]
+        sigma = x.std(axis=0) + 1e-9
+        lag_1 = (x[1:] * x[:-1]).mean(axis=0) / sigma**2
+        rows.append(np.hstack([np.log(sigma), lag_1, np.log(3.0 + kurtosis(x))]))
+    return np.array(rows)
+
+
+def area_under_curve(scores: np.ndarray, positive: np.ndarray) -> float:
+    """Share of pairs in order: Mann and Whitney's statistic."""
+    ranks = rankdata(scores)
+    n, m = positive.sum(), (~positive).sum()
+    return float((ranks[positive].sum() - n * (n + 1) / 2.0) / (n * m))
+
+
+def told_apart(real: np.ndarray, made: np.ndarray, folds: int = 5) -> float:
+    """AUC of Fisher's linear discriminant on windows that it was not fitted to; neighbours share a fold."""
+    x = np.vstack([real, made])
+    is_real = np.arange(len(x)) < len(real)
+    fold = np.hstack([np.arange(n) * folds // n for n in (len(real), len(made))])
+    scores = np.empty(len(x))
+    for k in range(folds):
+        fit = fold != k
+        centre, scale = x[fit].mean(axis=0), x[fit].std(axis=0) + 1e-9
+        z = (x - centre) / scale
+        means = [z[fit & (is_real == kind)].mean(axis=0) for kind in (False, True)]
+        within = z[fit] - np.array(means)[is_real[fit].astype(int)]
+        covariance = within.T @ within / fit.sum()
+        shrunk = 0.8 * covariance + 0.2 * np.trace(covariance) / len(covariance) * np.eye(len(covariance))
+        scores[fold == k] = (z @ cho_solve(cho_factor(shrunk), means[1] - means[0]))[fold == k]
+    return area_under_curve(scores, is_real)
+
+
+def compare(real: dict[str, np.ndarray], made: list[dict[str, np.ndarray]]) -> dict:
+    result: dict = {}
+    for name, samples in real.items():
+        sigma = high_passed(samples).std(axis=0)
+        drawn = np.array([high_passed(robot[name]).std(axis=0) for robot in made])
+        low, middle, high = np.quantile(drawn, [0.0, 0.5, 1.0], axis=0)
+        outside = np.maximum(np.maximum(low / sigma, sigma / high), 1.0)
+        result[name] = {
+            "quantities": {
+                axis: {"real": r, "simulated": [lo, mid, hi], "outside_by": factor}
+                for axis, r, lo, mid, hi, factor in zip(
+                    AXES, *(v.tolist() for v in (sigma, low, middle, high, outside)), strict=True
+                )
+            }
+        }
+        windows = features(samples)
+        if name != "rest" and len(windows) >= 4:
+            others = np.vstack([features(robot[name]) for robot in made])
+            result[name] |= {"real_windows": len(windows), "simulated_windows": len(others)}
+            result[name]["auc"] = told_apart(windows, others, folds=min(5, len(windows) // 2))
+    return result
+
+
+def page(result: dict) -> str:
+    lines = []
+    for name, motion in result.items():
+        auc = f"; AUC {motion['auc']:.2f} on {motion['real_windows']} real windows" if "auc" in motion else ""
+        lines += [
+            f"{name}{auc}",
+            "",
+            "| sigma above 20 Hz | real | simulated: least, median, most | outside by |",
+        ]
+        lines += ["|---|---|---|---|"]
+        for axis, row in motion["quantities"].items():
+            made = ", ".join(f"{value:.4f}" for value in row["simulated"])
+            lines.append(f"| {axis} | {row['real']:.4f} | {made} | x {row['outside_by']:.1f} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def main(words: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="noise_comparison", description=__doc__.splitlines()[0])
+    parser.add_argument("log", type=Path, help="LOG278.TXT of pichim/Mini_Segway")
+    parser.add_argument("--config", type=Path, default=repository_root() / "config/edumip.toml")
+    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--json", type=Path, help="write the numbers here")
+    given = parser.parse_args(words)
+    if not given.log.exists():
+        parser.error(f"{given.log}: cannot be opened")
+    binary = repository_root() / "build/host/equipoise"
+    made = [simulated_motions(binary, given.config, robot) for robot in range(1, given.robots + 1)]
+    made = [motions for motions in made if whole(motions)]
+    result = compare(real_motions(given.log), made)
+    if given.json:
+        given.json.write_text(json.dumps(result, indent=1) + "\n")
+    print(page(result))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
