@@ -88,7 +88,7 @@ def test_run_replay_and_report_agree_on_how_it_ended(equipoise, root, tmp_path, 
     """What ticks cannot tell stands in the log: an interrupted run looks like a finished one."""
     log, result = tmp_path / "run.lcm", tmp_path / "run.json"
     command = [root / "build/host/equipoise", "run", "--config", "config/edumip.toml", "--backend", "sim"]
-    command += ["--telemetry", "off", "--log", log, "--json", result]
+    command += ["--fidelity", "built2025", "--telemetry", "off", "--log", log, "--json", result]
     if ending in ("interrupted", "killed"):
         process = subprocess.Popen([*command, "--speed", "2"], cwd=root, stderr=subprocess.PIPE)
         while not log.exists() or log.stat().st_size < 100_000:
