@@ -12,7 +12,7 @@
 
 namespace equipoise {
 
-inline MbbrConfig mbbr_config() { return load_mbbr(config_file<app::MbbrFirmware>(), {}).config; }
+inline MbbrConfig mbbr_config() { return load_mbbr(config_file<MbbrFirmware>(), {}).config; }
 
 struct ClosedLoopOptions {
   Fidelity fidelity = Fidelity::kNominal;
@@ -37,7 +37,7 @@ inline MipLqrPipeline::Params pipeline_params(const MipConfig& config, const Mip
   return config.lqr_pipeline();
 }
 
-template <class Pipeline, class Firmware = app::MbbrFirmware>
+template <class Pipeline, class Firmware = MbbrFirmware>
 class ClosedLoopWith {
  public:
   using Config = typename Firmware::Config;

@@ -60,27 +60,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         bridge_(p.motor),
         safety_(p.safety) {}
 
-  Result tick(const RawSample& raw, const Command& asked, const LoopState& loop) noexcept {
-    Result t;
-    t.z = senses_.update(raw, loop.now_ns, wheel_rate_rad_s_, estimators_.reads_attitude());  // counts -> SI
-    bridge_gap(t.z, loop.inhibit);                                     // ticks that the loop has missed
-    t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
-    health_ = estimators_.health();
-    t.degraded = do_without(t.z);
-    t.ref = follow(limited(safety_.timely(asked), t.degraded), t.x_hat);  // [T] 6.2.1
-    t.u_lin = feedback_.update(t.ref);                                    // [T] (6.10)
-    t.u_lin += encoder_stimulus(t.z);  // shakes each wheel right after arming
-    const Input friction = friction_of(t.z, t.u_lin);
-    t.u_friction = t.u_lin + friction;            // [T] 6.2.2
-    const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
-    t.motors = safety_.gate(duty, checks(t, asked, loop.inhibit));
-    u_previous_ = applied_input(t, friction);
-    duty_previous_ = wheel_duty(t.motors);
-    t.arm_state = safety_.state();
-    t.reasons = safety_.reasons();
-    t.inhibit = loop.inhibit;
-    return t;
-  }
+  Result tick(const RawSample& raw, const Command& asked, const LoopState& loop) noexcept;
 
   Estimators& estimators() noexcept { return estimators_; }
   const Estimators& estimators() const noexcept { return estimators_; }
@@ -244,5 +224,30 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Wheels wheel_rate_rad_s_ = Wheels::Zero();  // as expected in the next tick
   Input u_previous_ = Input::Zero();
 };
+
+// Not inline: a robot's pipelines are compiled once, in its pipeline.cpp.
+template <class Robot, class Estimators, class Reference, class Feedback>
+auto Pipeline<Robot, Estimators, Reference, Feedback>::tick(const RawSample& raw, const Command& asked,
+                                                            const LoopState& loop) noexcept -> Result {
+  Result t;
+  t.z = senses_.update(raw, loop.now_ns, wheel_rate_rad_s_, estimators_.reads_attitude());  // counts -> SI
+  bridge_gap(t.z, loop.inhibit);                                     // ticks that the loop has missed
+  t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
+  health_ = estimators_.health();
+  t.degraded = do_without(t.z);
+  t.ref = follow(limited(safety_.timely(asked), t.degraded), t.x_hat);  // [T] 6.2.1
+  t.u_lin = feedback_.update(t.ref);                                    // [T] (6.10)
+  t.u_lin += encoder_stimulus(t.z);  // shakes each wheel right after arming
+  const Input friction = friction_of(t.z, t.u_lin);
+  t.u_friction = t.u_lin + friction;            // [T] 6.2.2
+  const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
+  t.motors = safety_.gate(duty, checks(t, asked, loop.inhibit));
+  u_previous_ = applied_input(t, friction);
+  duty_previous_ = wheel_duty(t.motors);
+  t.arm_state = safety_.state();
+  t.reasons = safety_.reasons();
+  t.inhibit = loop.inhibit;
+  return t;
+}
 
 }  // namespace equipoise

@@ -4,6 +4,7 @@
 
 #include "app/sim/hooks.hpp"
 #include "app/sim/simulated_run.hpp"
+#include "app/trial/firmware_of.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "python/simulation.hpp"
 #include "robots/lanes/roll.hpp"
@@ -51,6 +52,7 @@ class SimulatedOf : public Simulated {
   using Config = typename Firmware::Config;
   using Input = Vec<Robot::kInputs>;
   using Reference = typename Access::Reference;
+  using Configured = app::ConfiguredRobotOf<Firmware>;
 
   int wheels() const override { return Robot::kWheels; }
   int inputs() const override { return Robot::kInputs; }
@@ -65,58 +67,60 @@ class SimulatedOf : public Simulated {
 
   nlohmann::json run(app::SimRequest request, const Hooks& hooks, Recorder* recorder,
                      const app::TickObserver& observe, const std::atomic<bool>& stop) const override {
-    const auto loaded = app::load_for<Firmware>(&request);
-    const auto options = app::options_for<Firmware>(request, loaded.config);
+    const auto robot = app::load_for(&request);
+    const auto options = app::options_for(request, *robot);
     const app::TickObserver record = [&](const runtime::TickRecord& tick) {
       recorder->add(tick);
       observe(tick);
     };
     const app::TickObserver& each = recorder != nullptr ? record : observe;
-    const app::SimSummary summary =
-        hooks.any() ? hooked_run(loaded.config, request.choice, options, hooks, each, stop)
-                    : app::simulate<Firmware>(loaded.config, request.choice, options, each, stop);
-    nlohmann::json out = app::to_json<Firmware>(request, summary, loaded.sha256);
-    out["config_toml"] = loaded.toml;
+    const app::SimSummary summary = hooks.any()
+                                        ? hooked_run(*robot, request.choice, options, hooks, each, stop)
+                                        : app::simulate(*robot, request.choice, options, each, stop);
+    nlohmann::json out = app::to_json(request, summary, *robot);
+    out["config_toml"] = robot->toml;
     return out;
   }
 
   nlohmann::json dimensions(app::SimRequest request) const override {
-    const Config config = Firmware::apply(app::load_for<Firmware>(&request).config, request.choice);
+    const auto robot = app::load_for(&request);
+    const Config config = Firmware::apply(static_cast<const Configured&>(*robot).config, request.choice);
     return Access::dimensions(config.robot, config.world[fidelity_level(request.choice.fidelity)]);
   }
 
   nlohmann::json run_in_engine(app::SimRequest request, const MakeEngine& make,
                                const std::atomic<bool>& stop) const override {
+    using EngineWorld = typename Firmware::EngineWorld;
     std::vector<config::Drawn> drawn;
-    const auto loaded = app::load_for<Firmware>(&request, &drawn);
-    const app::SimOptions options = app::options_for<Firmware>(request, loaded.config);
-    const Config config = Firmware::apply(loaded.config, request.choice);
+    const auto robot = app::load_for(&request, &drawn);
+    const Config config = Firmware::apply(static_cast<const Configured&>(*robot).config, request.choice);
     auto params = config.world[fidelity_level(request.choice.fidelity)];
     params.common.seed = request.seed;
     const auto engine = make(Access::dimensions(config.robot, params));
-    typename Firmware::EngineWorld world(config.robot, config.motor, config.calibration, params, *engine);
+    app::WorldOf<Firmware, EngineWorld> world(
+        config, std::tie(config.robot, config.motor, config.calibration, params, *engine));
     const app::SimSummary summary =
-        Firmware::with_pipeline(config, request.choice.controller, [&](auto& pipeline) {
-          using Pipeline = std::decay_t<decltype(pipeline)>;
-          return app::SimulatedRun<Firmware, typename Firmware::EngineWorld, Pipeline>(
-                     world, pipeline, Firmware::rolling_radius_m(config), options, {}, stop)
+        Firmware::with_pipeline(config, request.choice.controller, [&](auto& own) {
+          app::FirmwareOf<Firmware, std::decay_t<decltype(own)>, EngineWorld> firmware(own.params());
+          return app::SimulatedRun(world, firmware, *robot, app::options_for(request, *robot), {}, stop)
               .run();
         });
-    nlohmann::json out = app::figures<Firmware>(summary);
+    nlohmann::json out = app::figures(*robot->type, summary);
     out["excluded_healthy"] = (summary.degraded & kSensorsJudged) != 0;
     out["drawn"] = app::by_name(drawn);
     return out;
   }
 
   std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const override {
-    const auto loaded = app::load_for<Firmware>(&request);
-    const Config config = Firmware::apply(loaded.config, request.choice);
-    return [request, config](std::uint64_t seed) {
+    const std::shared_ptr<const app::ConfiguredRobot> robot = app::load_for(&request);
+    const Config config = Firmware::apply(static_cast<const Configured&>(*robot).config, request.choice);
+    return [request, robot, config](std::uint64_t seed) {
       app::SimRequest seeded = request;
       seeded.seed = seed;
       return Firmware::with_pipeline(config, seeded.choice.controller, [&](auto& own) {
         using Own = std::decay_t<decltype(own)>;
-        return std::unique_ptr<Episode>(std::make_unique<EpisodeOf<Own>>(config, seeded, own.params()));
+        return std::unique_ptr<Episode>(
+            std::make_unique<EpisodeOf<Own>>(*robot, config, seeded, own.params()));
       });
     };
   }
@@ -159,27 +163,28 @@ class SimulatedOf : public Simulated {
            a.normalized_innovation == b.normalized_innovation;
   }
 
-  static app::SimSummary hooked_run(const Config& configured, const app::Choice& choice,
+  static app::SimSummary hooked_run(const app::ConfiguredRobot& robot, const app::Choice& choice,
                                     const app::SimOptions& options, const Hooks& hooks,
                                     const app::TickObserver& observe, const std::atomic<bool>& stop) {
-    const Config config = Firmware::apply(configured, choice);
-    World world = Firmware::world(config, fidelity_level(choice.fidelity), options.seed);
+    const Config config = Firmware::apply(static_cast<const Configured&>(robot).config, choice);
+    app::WorldOf<Firmware> world(config, choice, options.seed);
     return Firmware::with_pipeline(config, choice.controller, [&](auto& own) {
       using Own = std::decay_t<decltype(own)>;
       using Pipeline = app::Hooked<Own>;
-      const Pipeline* flying = nullptr;
+      const Pipeline* running = nullptr;
       app::FeedbackHook<Robot, Reference> feedback;
       if (hooks.controller) {
         feedback = [&](const Reference& reference, const app::OwnFeedback<Robot>& asked) -> Input {
-          return hooks.controller({world.time_s(), view(flying->estimators().controlling(), config.robot),
+          return hooks.controller({world.time_s(), view(running->estimators().controlling(), config.robot),
                                    view(reference, config.robot), Access::error(reference), asked()});
         };
       }
-      Pipeline pipeline(app::hooked<Own>(own.params(), feedback));
-      flying = &pipeline;
+      app::FirmwareOf<Firmware, Pipeline> firmware(app::hooked<Own>(own.params(), feedback));
+      running = &firmware.pipeline();
       if (hooks.estimator) {
-        pipeline.estimators().replace([&](const typename Robot::Sample& z, const Input& u, bool held,
-                                          const typename Robot::Estimate& own_estimate) {
+        firmware.pipeline().estimators().replace([&](const typename Robot::Sample& z, const Input& u,
+                                                     bool held,
+                                                     const typename Robot::Estimate& own_estimate) {
           const StateView own_view = view(own_estimate, config.robot);
           const StateView x = hooks.estimator({world.time_s(), held, z.gyro_B_rad_s, z.accel_B_m_s2,
                                                z.attitude_rad, z.imu_ok, z.encoders_ok, z.attitude_ok,
@@ -187,9 +192,7 @@ class SimulatedOf : public Simulated {
           return same(x, own_view) ? own_estimate : Access::estimate(x, config.robot);
         });
       }
-      return app::SimulatedRun<Firmware, World, Pipeline>(world, pipeline, Firmware::rolling_radius_m(config),
-                                                          options, observe, stop)
-          .run();
+      return app::SimulatedRun(world, firmware, robot, options, observe, stop).run();
     });
   }
 
@@ -198,32 +201,32 @@ class SimulatedOf : public Simulated {
    public:
     auto begin() noexcept {
       const MotorCommand* command = next_command();
-      return command != nullptr ? world_.begin(*command) : nullptr;
+      return command != nullptr ? world_.world.begin(*command) : nullptr;
     }
-    const World& world() const noexcept { return world_; }
+    const World& world() const noexcept { return world_.world; }
 
    protected:
-    explicit RollingEpisode(const World& world) : world_(world) {}
+    RollingEpisode(const Config& config, const app::SimRequest& request)
+        : world_(config, request.choice, request.seed) {}
     virtual const MotorCommand* next_command() const noexcept = 0;
 
-    Ahead<World> world_;
+    app::WorldOf<Firmware, Ahead<World>> world_;
   };
 
   /// Stands up under its own feedback; from then on the action takes its place.
   template <class Own>
   class EpisodeOf : public RollingEpisode {
    public:
-    EpisodeOf(const Config& config, const app::SimRequest& request, const typename Own::Params& params)
-        : RollingEpisode(Firmware::world(config, fidelity_level(request.choice.fidelity), request.seed)),
+    EpisodeOf(const app::ConfiguredRobot& robot, const Config& config, const app::SimRequest& request,
+              const typename Own::Params& params)
+        : RollingEpisode(config, request),
           kinematics_(config.robot),
-          robot_(config.robot),
-          pipeline_(app::hooked<Own>(params,
+          firmware_(app::hooked<Own>(params,
                                      [this](const Reference& r, const app::OwnFeedback<Robot>& own) -> Input {
                                        reference_ = r;
                                        return acts_ ? u_ : own();
                                      })),
-          run_(world_, pipeline_, Firmware::rolling_radius_m(config),
-               app::options_for<Firmware>(request, config), observe_, stop_) {
+          run_(world_, firmware_, robot, options_of(robot, request), observe_, stop_) {
       while (world_.time_s() < app::kDriveFrom_s && run_.step()) {
       }
       acts_ = true;
@@ -241,22 +244,28 @@ class SimulatedOf : public Simulated {
       out = std::copy(error.begin(), error.end(), out);
       std::copy(wanted.begin(), wanted.end(), out);
     }
-    StateView truth() const override { return view(world_.truth(), robot_); }
+    StateView truth() const override { return world_.truth(); }
 
    protected:
     const MotorCommand* next_command() const noexcept override { return run_.next_command(); }
 
    private:
     using RollingEpisode::world_;
+
+    static app::SimOptions options_of(const app::ConfiguredRobot& robot, const app::SimRequest& request) {
+      app::SimOptions options = app::options_for(request, robot);
+      options.figures = false;
+      return options;
+    }
+
     typename Robot::Kinematics kinematics_;
-    typename Robot::Parameters robot_;
     Reference reference_{};
     Input u_ = Input::Zero();
     bool acts_ = false;
-    app::Hooked<Own> pipeline_;
+    app::FirmwareOf<Firmware, app::Hooked<Own>, Ahead<World>> firmware_;
     app::TickObserver observe_;
     std::atomic<bool> stop_{false};
-    app::SimulatedRun<Firmware, Ahead<World>, app::Hooked<Own>, app::Figures::kNone> run_;
+    app::SimulatedRun run_;
   };
 };
 

@@ -11,6 +11,7 @@
 #include "app/sim/sim_job.hpp"
 #include "equipoise/plant/engine.hpp"
 #include "python/recorder.hpp"
+#include "robots/robot_list.hpp"
 
 namespace equipoise::python {
 

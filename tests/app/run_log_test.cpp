@@ -181,7 +181,7 @@ TEST(FieldList, PutsEachFieldWhereTheGeneratedCodeLooksForIt) {
   r.raw.imu_temperature_degC = 41.5;
   r.raw.health = 0x80000001U;
   r.degraded = 5;
-  r.motors = 3;
+  r.motor_count = 3;
   r.battery_V = 7.25;
   Bytes bytes;
   sensors_t sensors{};

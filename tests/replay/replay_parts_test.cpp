@@ -1,11 +1,14 @@
 // The parts of a replay: errors against the truth, the first number that differs, what counts and what is
 // judged.
+#include "app/log/replay_parts.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "app/log/replay_as.hpp"
+#include "robots/mbbr/mbbr.hpp"
+#include "robots/mip/mip.hpp"
 
 namespace equipoise {
 namespace {
@@ -59,7 +62,7 @@ TEST(Compare, FindsTheFirstNumberThatDiffersInAnyBit) {
   TickRecord replayed = logged;
   EXPECT_FALSE(compared(logged, replayed).found);
   replayed.estimate.theta_rad[1] = std::numeric_limits<double>::denorm_min();
-  replayed.duty[0] = 1.0;
+  replayed.motors.duty[0] = 1.0;
   const Difference d = compared(logged, replayed);
   EXPECT_TRUE(d.found);
   EXPECT_EQ(d.tick, 7);
@@ -71,7 +74,7 @@ TEST(Compare, FindsTheFirstNumberThatDiffersInAnyBit) {
 TEST(Compare, KnowsPlainFieldsMotorsAndHealth) {
   const TickRecord logged{};
   TickRecord replayed{};
-  replayed.duty[2] = -0.0;
+  replayed.motors.duty[2] = -0.0;
   EXPECT_EQ(compared(logged, replayed).field, "EQUIPOISE_MOTORS.duty[2]") << "another zero is another number";
   replayed = {};
   replayed.degraded = 1;
@@ -85,10 +88,10 @@ TEST(Compare, KnowsPlainFieldsMotorsAndHealth) {
 TEST(Compare, AnyNaNIsAnyOtherAndNoNumber) {
   TickRecord logged{};
   TickRecord replayed{};
-  logged.duty[0] = std::numeric_limits<double>::quiet_NaN();
-  replayed.duty[0] = -std::numeric_limits<double>::quiet_NaN();
+  logged.motors.duty[0] = std::numeric_limits<double>::quiet_NaN();
+  replayed.motors.duty[0] = -std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(compared(logged, replayed).found);
-  replayed.duty[0] = 0.0;
+  replayed.motors.duty[0] = 0.0;
   EXPECT_TRUE(compared(logged, replayed).found);
   EXPECT_TRUE(compared(replayed, logged).found);
 }
@@ -96,7 +99,7 @@ TEST(Compare, AnyNaNIsAnyOtherAndNoNumber) {
 TEST(Compare, KeepsTheFirstTicksDifference) {
   Difference d;
   TickRecord replayed{};
-  replayed.duty[0] = 1.0;
+  replayed.motors.duty[0] = 1.0;
   TickRecord logged{};
   logged.tick = 1;
   app::compare(logged, replayed, &d);
@@ -149,7 +152,7 @@ TEST(Recall, GivesWhatTheSimulationKnew) {
   s.phi_dot_rad_s[0] = 6.0;
   s.phi_dot_rad_s[1] = 7.0;
   MbbrEstimate x;
-  ASSERT_TRUE(app::recall(s, &x));
+  ASSERT_TRUE(recall(runtime::to_view(s), &x));
   EXPECT_EQ(x.theta_xy, Vec2(s.theta_rad[0], s.theta_rad[1]));
   EXPECT_EQ(x.theta_z, s.theta_rad[2]);
   EXPECT_EQ(x.omega_B, Vec3(1.0, 2.0, 3.0));
@@ -157,13 +160,7 @@ TEST(Recall, GivesWhatTheSimulationKnew) {
   EXPECT_EQ(x.phi, Vec2(4.0, 5.0));
   EXPECT_EQ(x.phi_dot_star, Vec2(6.0, 7.0));
   MipEstimate of_another_robot;
-  EXPECT_FALSE(app::recall(s, &of_another_robot)) << "its log does not hold all of it";
-}
-
-TEST(IndexOf, IsTheEstimatorsPlaceInTheRobotsList) {
-  EXPECT_EQ(app::index_of<app::MbbrFirmware>("ekf"), 0U);
-  EXPECT_EQ(app::index_of<app::MbbrFirmware>("truth"), 4U);
-  EXPECT_FALSE(app::index_of<app::MbbrFirmware>("none"));
+  EXPECT_FALSE(recall(runtime::to_view(s), &of_another_robot)) << "its log does not hold all of it";
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "app/text/errors.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 #include "replay/recorded_run.hpp"
+#include "support/config_files.hpp"
 
 namespace equipoise {
 namespace {
@@ -22,7 +23,6 @@ using testing::HasSubstr;
 
 class ReplayRun : public testing::Test {
  protected:
-  using Firmware = app::MbbrFirmware;
   static constexpr int kTicks = 1200;
 
   ReplayRun() : path_(testing::TempDir() + "replay-run-" + std::to_string(::getpid()) + ".lcm") {}
@@ -35,7 +35,8 @@ class ReplayRun : public testing::Test {
     plan.phase = app::Phase::kDriving;
     plan.fault_at_tick = 1 << 20;
     plan.end_tick = kTicks;
-    record_run<Firmware>(path_, plan, 1, [&](auto& telemetry, const TickRecord& r, const auto&, const auto&) {
+    const auto robot = app::load_robot(config_file<MbbrFirmware>(), {});
+    record_run(*robot, path_, plan, 1, [&](auto& telemetry, const TickRecord& r) {
       TickRecord logged = r;
       logged.has_truth = true;  // wrong by a known tilt
       logged.truth = r.estimate;
@@ -46,7 +47,7 @@ class ReplayRun : public testing::Test {
   }
   app::Replay replayed(const app::Beside& beside = {}) const {
     app::RunLog log(path_);
-    return app::replay_as<Firmware>(log, path_, beside);
+    return app::replay_log(log, path_, beside);
   }
 
   std::string path_;
@@ -168,7 +169,7 @@ TEST_F(ReplayRun, ALostTickIsMissingAndAChangedNumberADifference) {
   EXPECT_EQ(r.ticks, kTicks - 2);
   EXPECT_FALSE(r.identical());
   record([](TickRecord& t) {
-    if (t.tick == 60) t.duty[1] += 1e-12;
+    if (t.tick == 60) t.motors.duty[1] += 1e-12;
     return true;
   });
   r = replayed();

@@ -9,8 +9,8 @@
 
 namespace equipoise {
 
-using TestRobots = testing::Types<app::MbbrFirmware,  //
-                                  app::MipFirmware,   //
+using TestRobots = testing::Types<MbbrFirmware,  //
+                                  MipFirmware,   //
                                   CartPendulumFirmware>;
 
 }  // namespace equipoise

@@ -127,32 +127,30 @@ class MbbrTick : public ::testing::TestWithParam<std::string> {};
 class MipTick : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(MbbrTick, AllocatesNothing) {
-  EXPECT_EQ((allocations_of<app::MbbrFirmware, MbbrScheduledPipeline>(GetParam())), 0);
-  EXPECT_EQ((allocations_of<app::MbbrFirmware, MbbrThesisPipeline>(GetParam())), 0);
+  EXPECT_EQ((allocations_of<MbbrFirmware, MbbrScheduledPipeline>(GetParam())), 0);
+  EXPECT_EQ((allocations_of<MbbrFirmware, MbbrThesisPipeline>(GetParam())), 0);
 }
 
 TEST_P(MipTick, AllocatesNothing) {
-  EXPECT_EQ((allocations_of<app::MipFirmware, MipSlcPipeline>(GetParam())), 0);
-  EXPECT_EQ((allocations_of<app::MipFirmware, MipLqrPipeline>(GetParam())), 0);
+  EXPECT_EQ((allocations_of<MipFirmware, MipSlcPipeline>(GetParam())), 0);
+  EXPECT_EQ((allocations_of<MipFirmware, MipLqrPipeline>(GetParam())), 0);
 }
 
 TEST_P(MbbrTick, MakesNoSystemCall) {
-  const int status =
-      status_of_flights<app::MbbrFirmware, MbbrScheduledPipeline, MbbrThesisPipeline>(GetParam());
+  const int status = status_of_flights<MbbrFirmware, MbbrScheduledPipeline, MbbrThesisPipeline>(GetParam());
   if (status == -1) GTEST_SKIP() << "no seccomp filters here";
   EXPECT_EQ(status, 0) << "killed by a system call in the tick";
 }
 
 TEST_P(MipTick, MakesNoSystemCall) {
-  const int status = status_of_flights<app::MipFirmware, MipSlcPipeline, MipLqrPipeline>(GetParam());
+  const int status = status_of_flights<MipFirmware, MipSlcPipeline, MipLqrPipeline>(GetParam());
   if (status == -1) GTEST_SKIP() << "no seccomp filters here";
   EXPECT_EQ(status, 0) << "killed by a system call in the tick";
 }
 
 std::string named(const ::testing::TestParamInfo<std::string>& test) { return test.param; }
-INSTANTIATE_TEST_SUITE_P(EveryEstimator, MbbrTick, ::testing::ValuesIn(app::MbbrFirmware::estimators()),
-                         named);
-INSTANTIATE_TEST_SUITE_P(EveryEstimator, MipTick, ::testing::ValuesIn(app::MipFirmware::estimators()), named);
+INSTANTIATE_TEST_SUITE_P(EveryEstimator, MbbrTick, ::testing::ValuesIn(MbbrFirmware::estimators()), named);
+INSTANTIATE_TEST_SUITE_P(EveryEstimator, MipTick, ::testing::ValuesIn(MipFirmware::estimators()), named);
 
 }  // namespace
 }  // namespace equipoise

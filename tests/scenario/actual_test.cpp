@@ -32,14 +32,15 @@ app::SimSummary drive(const std::vector<std::string>& overrides, std::uint64_t s
   const std::string path = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
   app::Choice choice;
   choice.fidelity = "nominal";
-  app::complete<app::MbbrFirmware>(choice);
   app::SimOptions options;
   options.script.yaw_rate_rad_s = 2.0 * kPi;
   options.script.drive_mps = 0.1;
   options.duration_s = 30.0;
   options.seed = seed;
   const std::atomic<bool> stop{false};
-  return app::simulate<app::MbbrFirmware>(load_mbbr(path, overrides).config, choice, options, {}, stop);
+  const auto robot = app::load_robot(path, overrides);
+  app::complete(*robot->type, &choice);
+  return app::simulate(*robot, choice, options, {}, stop);
 }
 
 TEST(ActualRobot, StaysUprightWithEachScaleAtItsEnds) {

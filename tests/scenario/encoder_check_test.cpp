@@ -18,7 +18,7 @@ class EncoderCheckOnRobot : public testing::Test {
   static constexpr std::size_t kWheels = Firmware::Robot::kWheels;
 };
 
-using Robots = testing::Types<app::MbbrFirmware, app::MipFirmware>;
+using Robots = testing::Types<MbbrFirmware, MipFirmware>;
 TYPED_TEST_SUITE(EncoderCheckOnRobot, Robots);
 
 /// The robot does not run on the wheel's word: motors off and the wheel named, or it runs without the
@@ -66,7 +66,7 @@ TEST(LostEncoder, TheBallBalancerRunsOnWithoutIt) {
       if (++tick < 600) stuck = raw.encoder_counts[wheel];
       raw.encoder_counts[wheel] = stuck;
     };
-    const TrialEnd end = run_trial<app::MbbrFirmware>(choice, 7, 12.0, interfere);
+    const TrialEnd end = run_trial<MbbrFirmware>(choice, 7, 12.0, interfere);
     EXPECT_EQ(end.arm_state, ArmState::kArmed) << "wheel " << wheel << " reasons " << end.reasons;
     EXPECT_EQ(end.degraded, kWithoutWheelOne << wheel);
   }
@@ -87,7 +87,7 @@ TEST(PickUp, TurnsTheMotorsOffWhenTheWheelsLoseTheGround) {
   for (const std::string controller : {"slc", "lqr"}) {
     const app::Choice choice{"ekf", controller, "nominal", false, ""};
     const TrialEnd end =
-        run_trial<app::MipFirmware>(choice, 1, 8.0, [](RawSample&) {}, {"world.nominal.lift_at_s=3.0"});
+        run_trial<MipFirmware>(choice, 1, 8.0, [](RawSample&) {}, {"world.nominal.lift_at_s=3.0"});
     EXPECT_EQ(end.arm_state, ArmState::kFault) << controller;
     EXPECT_TRUE(end.reasons & (kPickedUp | kSaturated)) << controller << " reasons " << end.reasons;
   }

@@ -19,12 +19,12 @@ struct Lie {
 class Ends : public testing::TestWithParam<Lie> {};
 
 TEST_P(Ends, AndTheRobotDrivesOn) {
-  using Firmware = app::MbbrFirmware;
+  using Firmware = MbbrFirmware;
   app::Choice choice;
   choice.estimator = Firmware::kDefaultEstimator;
   choice.controller = Firmware::kDefaultController;
   choice.fidelity = "nominal";
-  const auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), {}).config, choice);
+  const auto robot = app::load_robot(config_file<Firmware>(), {});
   const Lie& lie = GetParam();
   app::FaultPlan plan;
   plan.phase = app::Phase::kDriving;
@@ -33,10 +33,7 @@ TEST_P(Ends, AndTheRobotDrivesOn) {
   plan.fault_ticks = lie.ticks;
   plan.end_tick = 2000;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), seed);
-    const app::FaultOutcome outcome = Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-      return app::run_with_fault(world, pipeline, plan, seed, [](const auto&...) {});
-    });
+    const app::FaultOutcome outcome = app::run_with_fault(*robot, choice, plan, seed);
     EXPECT_FALSE(outcome.unsafe) << outcome.why << ", seed " << seed;
     EXPECT_TRUE(outcome.upright) << "seed " << seed;
   }

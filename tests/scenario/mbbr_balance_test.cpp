@@ -27,7 +27,7 @@ SimSummary run(const Setting& o, MbbrEstimatorId estimator, const std::vector<st
   const app::Choice choice{name(kMbbrEstimatorNames, estimator), o.controller,
                            name(kFidelityNames, o.fidelity), o.compare};
   const app::SimOptions options{{true, o.drive_mps, 2.0 * kPi * o.yaw_hz}, o.duration_s, o.seed};
-  return app::simulate<app::MbbrFirmware>(load_mbbr(kMbbr, set).config, choice, options, nullptr, never);
+  return app::simulate(*app::load_robot(kMbbr, set), choice, options, nullptr, never);
 }
 
 struct Drive {

@@ -16,7 +16,7 @@ app::SimSummary run(const std::string& controller, double yaw_rate_rad_s, std::u
   static const std::atomic<bool> never{false};
   const app::Choice choice{"ekf", controller, "nominal", compare, "dmp"};
   const app::SimOptions options{{true, 0.0, yaw_rate_rad_s}, duration_s, seed};
-  return app::simulate<app::MipFirmware>(load_mip(kMip, set).config, choice, options, nullptr, never);
+  return app::simulate(*app::load_robot(kMip, set), choice, options, nullptr, never);
 }
 
 /// A robot of the population, in world `built2025` with what is set there.
@@ -24,9 +24,8 @@ app::SimSummary run_drawn(std::int64_t robot, const std::string& controller, con
                           const std::vector<std::string>& set = {}) {
   static const std::atomic<bool> never{false};
   const auto drawn = config::draw_robot(kMip, set, "built2025", robot);
-  return app::simulate<app::MipFirmware>(
-      load_mip(kMip, config::with_robot_drawn(drawn, "built2025", set)).config,
-      {"ekf", controller, "built2025", false, "dmp"}, options, nullptr, never);
+  return app::simulate(*app::load_robot(kMip, config::with_robot_drawn(drawn, "built2025", set)),
+                       {"ekf", controller, "built2025", false, "dmp"}, options, nullptr, never);
 }
 
 using Case = std::tuple<const char*, const char*, double>;  // controller, bridge, yaw rate

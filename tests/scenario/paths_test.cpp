@@ -10,33 +10,30 @@
 namespace equipoise {
 namespace {
 
-template <class Firmware>
-app::SimSummary fly(app::SimRequest request) {
-  request.config = config_file<Firmware>();
+app::SimSummary driven(const std::string& config, app::SimRequest request) {
+  request.config = config;
   request.choice.fidelity = "built2025";
-  const auto loaded = app::load_for<Firmware>(&request);
+  const auto robot = app::load_for(&request);
   const std::atomic<bool> stop{false};
-  return app::simulate<Firmware>(loaded.config, request.choice,
-                                 app::options_for<Firmware>(request, loaded.config), {}, stop);
+  return app::simulate(*robot, request.choice, app::options_for(request, *robot), {}, stop);
 }
 
 class OnPath : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(All, OnPath, testing::Values("circle", "figure8", "square", "waltz"));
 
-template <class Firmware>
-void expect_follows(const char* path, double off_m) {
+void expect_follows(const std::string& config, const char* path, double off_m) {
   for (const std::int64_t robot : {0, 1, 2}) {
     app::SimRequest request;
     request.robot = robot;
     request.path = path;
-    const app::SimSummary s = fly<Firmware>(request);
+    const app::SimSummary s = driven(config, request);
     EXPECT_FALSE(s.verdict.fell()) << "robot " << robot;
     EXPECT_LT(s.path_rmse_m, off_m) << "robot " << robot;
   }
 }
 
-TEST_P(OnPath, TheBallBalancerGoes) { expect_follows<app::MbbrFirmware>(GetParam(), 0.12); }
-TEST_P(OnPath, TheMipGoes) { expect_follows<app::MipFirmware>(GetParam(), 0.12); }
+TEST_P(OnPath, TheBallBalancerGoes) { expect_follows(config_file<MbbrFirmware>(), GetParam(), 0.12); }
+TEST_P(OnPath, TheMipGoes) { expect_follows(config_file<MipFirmware>(), GetParam(), 0.12); }
 
 TEST(SlippingWheels, StartsAreGentleEnoughForMostRobots) {
   int upright = 0;
@@ -48,7 +45,7 @@ TEST(SlippingWheels, StartsAreGentleEnoughForMostRobots) {
       request.yaw_rate_rad_s = 2.0 * kPi * yaw_hz;
       request.drive_mps = 0.2;
       request.duration_s = 5.0;
-      upright += fly<app::MbbrFirmware>(request).verdict.fell() ? 0 : 1;
+      upright += driven(config_file<MbbrFirmware>(), request).verdict.fell() ? 0 : 1;
     }
   }
   EXPECT_GE(upright, 17);

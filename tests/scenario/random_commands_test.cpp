@@ -131,24 +131,21 @@ int lost(const Trials& t) {
 const Range kMbbrRange{0.6, 6.0 * kPi};
 const Range kMipRange{0.8, 10.0};
 
-TEST(RandomCommands, NoneMakesTheMbbrFall) {
-  EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange}), 0);
-}
+TEST(RandomCommands, NoneMakesTheMbbrFall) { EXPECT_EQ(lost<MbbrFirmware>({"scheduled", kMbbrRange}), 0); }
 
 TEST(RandomCommands, NoneByHandMakesARobotFall) {
   Trials mbbr{"scheduled", kMbbrRange};
   Trials mip{"slc", kMipRange};
   mbbr.by_hand = mip.by_hand = true;
-  EXPECT_EQ(lost<app::MbbrFirmware>(mbbr), 0);
-  EXPECT_EQ(lost<app::MipFirmware>(mip), 0);
+  EXPECT_EQ(lost<MbbrFirmware>(mbbr), 0);
+  EXPECT_EQ(lost<MipFirmware>(mip), 0);
 }
 
 /// Of one sequence of the MBBR.
 std::string mbbr_loss(std::uint64_t sequence) {
-  const app::Choice choice{app::MbbrFirmware::kDefaultEstimator, "scheduled", "built2025"};
-  const auto config =
-      app::MbbrFirmware::apply(app::MbbrFirmware::load(config_file<app::MbbrFirmware>(), {}).config, choice);
-  return loss<app::MbbrFirmware>(config, {"scheduled", kMbbrRange}, sequence);
+  const app::Choice choice{MbbrFirmware::kDefaultEstimator, "scheduled", "built2025"};
+  const auto config = MbbrFirmware::apply(MbbrFirmware::load(config_file<MbbrFirmware>(), {}).config, choice);
+  return loss<MbbrFirmware>(config, {"scheduled", kMbbrRange}, sequence);
 }
 
 /// All wheels held by stiction, it tips over its rolling ball as one piece: no encoder is dead.
@@ -160,25 +157,21 @@ TEST(RandomCommands, WheelsThatATurnLeavesStillAreNotDead) { EXPECT_EQ(mbbr_loss
 /// A sound encoder was left out 23 s before: no sign of a swapped gyro.
 TEST(RandomCommands, AnEncoderLeftOutLongAgoDoesNotAccuseTheGyro) { EXPECT_EQ(mbbr_loss(2321), ""); }
 
-TEST(RandomCommands, NoneMakesTheMipFallUnderSlc) {
-  EXPECT_EQ(lost<app::MipFirmware>({"slc", kMipRange}), 0);
-}
+TEST(RandomCommands, NoneMakesTheMipFallUnderSlc) { EXPECT_EQ(lost<MipFirmware>({"slc", kMipRange}), 0); }
 
-TEST(RandomCommands, NoneMakesTheMipFallUnderLqr) {
-  EXPECT_EQ(lost<app::MipFirmware>({"lqr", kMipRange}), 0);
-}
+TEST(RandomCommands, NoneMakesTheMipFallUnderLqr) { EXPECT_EQ(lost<MipFirmware>({"lqr", kMipRange}), 0); }
 
 /// A configuration that asks for ten times the acceleration is held back to the lean that torque can bring
 /// back.
 TEST(RandomCommands, AnImpatientConfigurationIsHeldBack) {
   const std::vector<std::string> impatient{"reference.max_acceleration_m_s2=5.0"};
-  EXPECT_EQ(lost<app::MbbrFirmware>({"scheduled", kMbbrRange, impatient}), 0);
+  EXPECT_EQ(lost<MbbrFirmware>({"scheduled", kMbbrRange, impatient}), 0);
 }
 
 /// Slew limits alone lose 28 of 200 and 195 of 200.
 TEST(RandomCommands, WithoutTheGovernorSomeFall) {
-  EXPECT_GT(lost<app::MbbrFirmware>({"scheduled", kMbbrRange, {}, false, 4}), 0);
-  EXPECT_GT(lost<app::MipFirmware>({"slc", kMipRange, {}, false}), sequences() / 2);
+  EXPECT_GT(lost<MbbrFirmware>({"scheduled", kMbbrRange, {}, false, 4}), 0);
+  EXPECT_GT(lost<MipFirmware>({"slc", kMipRange, {}, false}), sequences() / 2);
 }
 
 }  // namespace

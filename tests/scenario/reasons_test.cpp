@@ -39,10 +39,11 @@ struct Scene {
 template <class Firmware>
 std::uint32_t reasons_of(const Scene& scene) {
   app::Choice choice{scene.estimator, "", "nominal", false, ""};
-  app::complete<Firmware>(choice);
-  const auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), scene.set).config, choice);
-  auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), 1);
-  app::PlantBackend plant(world);
+  const auto robot = type_of<Firmware>().load(config_file<Firmware>(), scene.set);
+  app::complete(*robot->type, &choice);
+  const auto firmware = robot->firmware(choice);
+  const auto world = robot->world(choice, 1);
+  app::PlantBackend plant(*world);
   app::FaultBackend faulty(plant.io(), 1);
   app::Hardware hardware(faulty.io());
   runtime::Supervisor own(scene.watched);
@@ -64,15 +65,13 @@ std::uint32_t reasons_of(const Scene& scene) {
     ticks = tick + 1;
     if (tick == kArmTick + 100 && !scene.fault.empty()) faulty.start(scene.fault[0], 1 << 20);
   };
-  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    SteppedIo io(hardware, 1000, spoil);
-    (void)runtime::run_loop(io, pipeline, commands, on_tick, never, supervisor);
-  });
+  SteppedIo io(hardware, 1000, spoil);
+  (void)runtime::run_loop(io, *firmware, commands, on_tick, never, supervisor);
   return seen;
 }
 
-std::uint32_t mbbr(const Scene& scene) { return reasons_of<app::MbbrFirmware>(scene); }
-std::uint32_t mip(const Scene& scene) { return reasons_of<app::MipFirmware>(scene); }
+std::uint32_t mbbr(const Scene& scene) { return reasons_of<MbbrFirmware>(scene); }
+std::uint32_t mip(const Scene& scene) { return reasons_of<MipFirmware>(scene); }
 
 std::uint32_t after(app::FaultKind fault) {
   Scene scene;

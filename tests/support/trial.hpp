@@ -24,30 +24,28 @@ struct TrialEnd {
 template <class Firmware, class Interfere>
 TrialEnd run_trial(const app::Choice& choice, std::uint64_t seed, double seconds, Interfere&& interfere,
                    const std::vector<std::string>& set = {}) {
-  const auto config = Firmware::apply(Firmware::load(config_file<Firmware>(), set).config, choice);
-  auto world = Firmware::world(config, app::fidelity_level(choice.fidelity), seed);
-  app::PlantBackend backend(world);
+  const auto robot = type_of<Firmware>().load(config_file<Firmware>(), set);
+  const auto firmware = robot->firmware(choice);
+  const auto world = robot->world(choice, seed);
+  app::PlantBackend backend(*world);
   app::Hardware hardware(backend.io());
-  return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    constexpr std::int64_t kRestTicks = 100;
-    TrialEnd end;
-    std::atomic<bool> done{false};
-    const auto commands = [&](std::int64_t tick, std::int64_t) {
-      pipeline.estimators().observe_truth(world.truth());
-      Command command;
-      command.arm = tick >= kRestTicks;
-      return command;
-    };
-    const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&,
-                             const auto& t) {
-      end = {t.arm_state, t.reasons, end.degraded | t.degraded,
-             static_cast<double>(tick - kRestTicks) * kTickS};
-      done = tick > kRestTicks && !t.motors.enable;
-    };
-    SteppedIo io(hardware, kRestTicks + static_cast<std::int64_t>(seconds * kTickHz), interfere);
-    (void)runtime::run_loop(io, pipeline, commands, on_tick, done);
-    return end;
-  });
+  constexpr std::int64_t kRestTicks = 100;
+  TrialEnd end;
+  std::atomic<bool> done{false};
+  const auto commands = [&](std::int64_t tick, std::int64_t) {
+    firmware->observe_truth(*world);
+    Command command;
+    command.arm = tick >= kRestTicks;
+    return command;
+  };
+  const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&, const auto& t) {
+    end = {static_cast<ArmState>(t.arm_state), t.reasons, end.degraded | t.degraded,
+           static_cast<double>(tick - kRestTicks) * kTickS};
+    done = tick > kRestTicks && !t.motors.enable;
+  };
+  SteppedIo io(hardware, kRestTicks + static_cast<std::int64_t>(seconds * kTickHz), interfere);
+  (void)runtime::run_loop(io, *firmware, commands, on_tick, done);
+  return end;
 }
 
 }  // namespace equipoise

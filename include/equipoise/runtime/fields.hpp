@@ -57,11 +57,11 @@ struct Motors {
   static constexpr const char* kType = "motors_t";
   template <class Record, class Visit>
   static constexpr void visit(Record& r, Visit&& field) {
-    field("motors", "", r.motors);
+    field("motors", "", r.motor_count);
     field("u_lin", "", r.u_lin);
     field("u_friction", "", r.u_friction);
-    field("duty", "", r.duty);
-    field("enable", "", r.enable);
+    field("duty", "", r.motors.duty);
+    field("enable", "", r.motors.enable);
     field("saturated", "", r.saturated);
   }
 };

@@ -33,6 +33,11 @@ inline StateRecord to_record(const StateView& v) noexcept {
           v.normalized_innovation};
 }
 
+inline StateView to_view(const StateRecord& r) noexcept {
+  return {Vec3(r.theta_rad.data()),     Vec3(r.omega_B_rad_s.data()), Vec2(r.phi_rad.data()),
+          Vec2(r.phi_dot_rad_s.data()), Vec2(r.position_W_m.data()),  r.normalized_innovation};
+}
+
 struct TickRecord {
   std::int64_t tick;
   std::int64_t now_ns;  // loop clock; simulated time in simulation
@@ -54,10 +59,9 @@ struct TickRecord {
   // motors
   std::array<double, 3> u_lin;
   std::array<double, 3> u_friction;
-  std::array<double, kMaxMotors> duty;
-  bool enable;
+  MotorCommand motors;
   bool saturated;
-  std::int32_t motors;  // of the robot; the rest of `duty` is empty
+  std::int32_t motor_count;  // of the robot; the rest of the duties is empty
   // health
   std::int32_t arm_state;
   std::uint32_t reasons;

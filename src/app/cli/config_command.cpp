@@ -8,7 +8,7 @@
 
 #include "app/cli/commands.hpp"
 #include "app/text/json.hpp"
-#include "robots/robot_list.hpp"
+#include "app/trial/firmware.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -27,10 +27,8 @@ struct Configuration {
 };
 
 Configuration read(const std::string& path, const std::vector<std::string>& set) {
-  return with_robot(robot_type(path), path, [&](auto firmware) {
-    const auto loaded = firmware.load(path, set);
-    return Configuration{loaded.keys, loaded.toml};
-  });
+  const auto robot = load_robot(path, set);
+  return {robot->keys, robot->toml};
 }
 
 bool ends_with(const std::string& text, const std::string& end) {

@@ -10,8 +10,8 @@
 #include "app/board/self_test.hpp"
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/trial/firmware.hpp"
 #include "bbb.h"
+#include "robots/robot_list.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -55,13 +55,12 @@ class Instructions {
   int fd_ = -1;
 };
 
-/// Samples of a short run, then loop and pipeline alone on them.
-template <class Firmware>
+/// Samples of a short run, then loop and firmware alone on them.
 nlohmann::json bench_tick(const BenchArguments& a) {
+  const auto robot = load_robot(a.config, {});
   Choice choice;
-  complete<Firmware>(choice);
+  complete(*robot->type, &choice);
   choice.fidelity = "nominal";
-  const auto config = Firmware::apply(Firmware::load(a.config, {}).config, choice);
   const auto commands = [](std::int64_t tick, std::int64_t /*now_ns*/) {
     Command command;
     command.arm = tick >= 100;
@@ -70,36 +69,33 @@ nlohmann::json bench_tick(const BenchArguments& a) {
   std::atomic<bool> done{false};
   runtime::RecordedSamples recording;
   recording.samples.reserve(static_cast<std::size_t>(a.ticks));
-  auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);
-  PlantBackend backend(world);
+  const auto world = robot->world(choice, 1);
+  PlantBackend backend(*world);
   Hardware simulated(backend.io());
-  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    const auto record = [&](std::int64_t tick, std::int64_t, const RawSample& raw, const auto&...) {
-      recording.samples.push_back(raw);
-      done = tick + 1 >= a.ticks;
-    };
-    (void)runtime::run_loop(simulated, pipeline, commands, record, done);
-  });
-  return Firmware::with_pipeline(config, choice.controller, [&](auto& fresh) {
-    const Instructions instructions;
-    const nlohmann::json before = instructions.count();
-    const std::int64_t start_ns = runtime::monotonic_now_ns();
-    done = false;
-    (void)runtime::run_loop(
-        recording, fresh, commands, [](const auto&...) {}, done);
-    const std::int64_t end_ns = runtime::monotonic_now_ns();
-    const nlohmann::json after = instructions.count();
-    nlohmann::json out{{"robot", Firmware::kName},
-                       {"estimator", choice.estimator},
-                       {"controller", choice.controller},
-                       {"tick_ns", static_cast<double>(end_ns - start_ns) / a.ticks},
-                       {"tick_instructions", nullptr}};
-    if (before.is_number() && after.is_number()) {
-      const auto n = after.get<std::uint64_t>() - before.get<std::uint64_t>();
-      out["tick_instructions"] = static_cast<double>(n) / a.ticks;
-    }
-    return out;
-  });
+  const auto record = [&](std::int64_t tick, std::int64_t, const RawSample& raw, const auto&...) {
+    recording.samples.push_back(raw);
+    done = tick + 1 >= a.ticks;
+  };
+  (void)runtime::run_loop(simulated, *robot->firmware(choice), commands, record, done);
+  const auto fresh = robot->firmware(choice);
+  const Instructions instructions;
+  const nlohmann::json before = instructions.count();
+  const std::int64_t start_ns = runtime::monotonic_now_ns();
+  done = false;
+  (void)runtime::run_loop(
+      recording, *fresh, commands, [](const auto&...) {}, done);
+  const std::int64_t end_ns = runtime::monotonic_now_ns();
+  const nlohmann::json after = instructions.count();
+  nlohmann::json out{{"robot", robot->type->name},
+                     {"estimator", choice.estimator},
+                     {"controller", choice.controller},
+                     {"tick_ns", static_cast<double>(end_ns - start_ns) / a.ticks},
+                     {"tick_instructions", nullptr}};
+  if (before.is_number() && after.is_number()) {
+    const auto n = after.get<std::uint64_t>() - before.get<std::uint64_t>();
+    out["tick_instructions"] = static_cast<double>(n) / a.ticks;
+  }
+  return out;
 }
 
 nlohmann::json quantiles(std::vector<std::int64_t> late_ns) {
@@ -141,8 +137,7 @@ nlohmann::json bench_wake(const BenchArguments& a) {
 }
 
 int run(const BenchArguments& a) {
-  nlohmann::json out = with_robot(robot_type(a.config), a.config,
-                                  [&](auto firmware) { return bench_tick<decltype(firmware)>(a); });
+  nlohmann::json out = bench_tick(a);
   {
     const runtime::Realtime realtime(runtime::RealtimeWish{});
     out["realtime"] = to_json(realtime);

@@ -4,7 +4,6 @@
 #include <fstream>
 #include <map>
 #include <memory>
-#include <optional>
 #include <random>
 #include <utility>
 
@@ -53,16 +52,6 @@ struct Case {
   std::uint64_t seed = 0;
 };
 
-template <class Firmware>
-FaultOutcome one(const typename Firmware::Config& config, const Choice& choice, const FaultPlan& plan,
-                 std::uint64_t seed) {
-  auto world = Firmware::world(config, fidelity_level(choice.fidelity), seed);
-  return Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    const auto unrecorded = [](const auto&...) {};
-    return run_with_fault(world, pipeline, plan, seed, unrecorded);
-  });
-}
-
 int fault_tick(Phase phase) {
   switch (phase) {
     case Phase::kDisarmed:
@@ -75,8 +64,7 @@ int fault_tick(Phase phase) {
 }
 
 /// Runs with a random fault each, of random kind, time and length; between faults nothing may happen.
-template <class Firmware>
-Soak soak(const typename Firmware::Config& config, const Choice& choice, double hours, std::uint64_t seed) {
+Soak soak(const ConfiguredRobot& robot, const Choice& choice, double hours, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   const auto pick = [&engine](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(engine);
@@ -92,7 +80,7 @@ Soak soak(const typename Firmware::Config& config, const Choice& choice, double 
     plan.fault_ticks = pick(1, 200);
     plan.end_tick = plan.fault_at_tick + pick(200, 2000);
     const std::uint64_t run_seed = engine();
-    const FaultOutcome v = one<Firmware>(config, choice, plan, run_seed);
+    const FaultOutcome v = run_with_fault(robot, choice, plan, run_seed);
     ticks += plan.end_tick;
     ++s.runs;
     s.disarmed += v.disarmed ? 1 : 0;
@@ -114,11 +102,9 @@ Soak soak(const typename Firmware::Config& config, const Choice& choice, double 
 }
 
 /// The robot as it was drawn.
-template <class Firmware>
-typename Firmware::Config configured(const CampaignArguments& a, const Choice& choice, std::int64_t robot) {
+std::unique_ptr<const ConfiguredRobot> configured(const CampaignArguments& a, std::int64_t robot) {
   const auto drawn = config::draw_robot(a.config, a.set, a.fidelity, robot);
-  return Firmware::apply(Firmware::load(a.config, config::with_robot_drawn(drawn, a.fidelity, a.set)).config,
-                         choice);
+  return load_robot(a.config, config::with_robot_drawn(drawn, a.fidelity, a.set));
 }
 
 bool chosen(const std::vector<std::string>& names, const char* name) {
@@ -191,22 +177,22 @@ std::string cell_of(const std::vector<FaultOutcome>& outcomes) {
   return cell.empty() ? "stays off: " + reasons_text(reasons) : cell;
 }
 
-template <class Firmware>
 int campaign(const CampaignArguments& a) {
+  const RobotType& type = robot_type_of(robot_type(a.config), a.config);
   Choice choice;
   choice.controller = a.controller;
   choice.fidelity = a.fidelity;
-  complete<Firmware>(choice);
+  complete(type, &choice);
   // To configure a robot takes as long as a second of its run: on all threads, too.
-  std::vector<std::optional<typename Firmware::Config>> configs(static_cast<std::size_t>(a.robots));
+  std::vector<std::unique_ptr<const ConfiguredRobot>> robots(static_cast<std::size_t>(a.robots));
   Workers(threads_for(a.jobs)).each(a.robots, [&](int r) {
-    configs[static_cast<std::size_t>(r)] = configured<Firmware>(a, choice, a.robot + r);
+    robots[static_cast<std::size_t>(r)] = configured(a, a.robot + r);
   });
   const std::vector<Case> all = cases_of(a);
   const auto outcomes =
       in_parallel<FaultOutcome>("campaign", all.size(), threads_for(a.jobs), [&](std::size_t i) {
         const Case& c = all[i];
-        return one<Firmware>(*configs[static_cast<std::size_t>(c.robot - a.robot)], choice, c.plan, c.seed);
+        return run_with_fault(*robots[static_cast<std::size_t>(c.robot - a.robot)], choice, c.plan, c.seed);
       });
 
   nlohmann::json cases = nlohmann::json::array();
@@ -235,12 +221,12 @@ int campaign(const CampaignArguments& a) {
     table += "\n";
   }
   nlohmann::json out{
-      {"robot", Firmware::kName}, {"cases", cases}, {"case_count", cases.size()}, {"unsafe", unsafe}};
+      {"robot", type.name}, {"cases", cases}, {"case_count", cases.size()}, {"unsafe", unsafe}};
   std::string summary =
       std::to_string(cases.size()) + " fault x phase cases, " + std::to_string(unsafe) + " unsafe";
   std::string soak_runs;
   if (a.soak_h > 0.0) {
-    const Soak s = soak<Firmware>(*configs[0], choice, a.soak_h, a.seed);
+    const Soak s = soak(*robots[0], choice, a.soak_h, a.seed);
     out["soak"] = {{"hours", s.hours},
                    {"runs", s.runs},
                    {"disarmed", s.disarmed},
@@ -259,10 +245,10 @@ int campaign(const CampaignArguments& a) {
   }
   if (!a.markdown.empty()) {
     std::ofstream file(a.markdown);
-    file << "## " << Firmware::kName << "\n" << summary << ".\n" << soak_runs << "\n" << table;
+    file << "## " << type.name << "\n" << summary << ".\n" << soak_runs << "\n" << table;
     if (!file.flush()) throw InputError(a.markdown + ": cannot be written");
   }
-  std::fprintf(a.json == "-" ? stderr : stdout, "%s: %s\n", Firmware::kName, summary.c_str());
+  std::fprintf(a.json == "-" ? stderr : stdout, "%s: %s\n", type.name, summary.c_str());
   if (!a.json.empty()) write_json(out, a.json);
   return unsafe == 0 ? 0 : 1;
 }
@@ -299,10 +285,7 @@ void add_campaign(Subcommand app) {
       .range(0.0, 10000.0);
   command.option("--markdown", a->markdown, "table for docs/reliability.md").file();
   command.option("--json", a->json, "cases as JSON, - for stdout").file();
-  command.action([=] {
-    return with_robot(robot_type(a->config), a->config,
-                      [&](auto firmware) { return campaign<decltype(firmware)>(*a); });
-  });
+  command.action([=] { return campaign(*a); });
 }
 
 }  // namespace equipoise::app

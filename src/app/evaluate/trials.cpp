@@ -6,6 +6,7 @@
 #include "app/evaluate/parallel.hpp"
 #include "app/sim/sim_job.hpp"
 #include "app/text/json.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -50,33 +51,30 @@ SimRequest request_of(const Arguments& a, const nlohmann::json& row) {
   return r;
 }
 
-template <class Firmware>
 SimSummary summary_of(SimRequest* r, std::vector<config::Drawn>* drawn = nullptr) {
-  const auto loaded = load_for<Firmware>(r, drawn);
+  const auto robot = load_for(r, drawn);
   const std::atomic<bool> stop{false};
-  return simulate<Firmware>(loaded.config, r->choice, options_for<Firmware>(*r, loaded.config), {}, stop);
+  return simulate(*robot, r->choice, options_for(*r, *robot), {}, stop);
 }
 
 /// What its fault detection did to a robot without a fault; null where no twin without it has run.
-template <class Firmware>
 nlohmann::json judged(const SimSummary& run, SimRequest r, bool twins) {
   nlohmann::json out{{"excluded_healthy", (run.degraded & kSensorsJudged) != 0},
                      {"off_though_it_stands", nullptr},
                      {"saved_by_detector", nullptr}};
   if (!twins) return out;
   r.set.emplace_back("safety.detection=false");
-  const bool twin_stands = !summary_of<Firmware>(&r).verdict.fell();
+  const bool twin_stands = !summary_of(&r).verdict.fell();
   out["off_though_it_stands"] = run.verdict.ended == Ended::kDisarmed && twin_stands;
   out["saved_by_detector"] = !run.verdict.fell() && !twin_stands;
   return out;
 }
 
-template <class Firmware>
-nlohmann::json run(SimRequest r, bool twins) {
+nlohmann::json run(const RobotType& type, SimRequest r, bool twins) {
   std::vector<config::Drawn> drawn;
-  const SimSummary summary = summary_of<Firmware>(&r, &drawn);
-  nlohmann::json row = figures<Firmware>(summary);
-  row.update(judged<Firmware>(summary, r, twins));
+  const SimSummary summary = summary_of(&r, &drawn);
+  nlohmann::json row = figures(type, summary);
+  row.update(judged(summary, r, twins));
   row.update({{"robot", r.robot},
               {"seed", r.seed},
               {"yaw_hz", r.yaw_rate_rad_s / (2.0 * kPi)},
@@ -87,8 +85,8 @@ nlohmann::json run(SimRequest r, bool twins) {
   return row;
 }
 
-template <class Firmware>
 int run_all(const Arguments& a) {
+  const RobotType& type = robot_type_of(robot_type(a.config), a.config);
   const nlohmann::json in = read_json(a.in);
   std::vector<SimRequest> trials;
   try {
@@ -97,8 +95,8 @@ int run_all(const Arguments& a) {
     throw InputError(a.in + ": " + error.what());
   }
   const auto rows = in_parallel<nlohmann::json>("trials", trials.size(), threads_for(a.jobs),
-                                                [&](std::size_t i) { return run<Firmware>(trials[i], a.twins); });
-  write_json({{"robot", Firmware::kName}, {"version", version()}, {"trials", rows}}, a.json);
+                                                [&](std::size_t i) { return run(type, trials[i], a.twins); });
+  write_json({{"robot", type.name}, {"version", version()}, {"trials", rows}}, a.json);
   return 0;
 }
 
@@ -123,10 +121,7 @@ void add_trials(Subcommand app) {
   command.option("--jobs", a->jobs, "threads; 0: one per core. The results do not depend on it")
       .show_default()
       .range(0, 1024);
-  command.action([=] {
-    return with_robot(robot_type(a->config), a->config,
-                      [&](auto firmware) { return run_all<decltype(firmware)>(*a); });
-  });
+  command.action([=] { return run_all(*a); });
 }
 
 }  // namespace equipoise::app

@@ -1,6 +1,165 @@
-#include "app/log/replay_as.hpp"
+#include "app/log/replay.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <exception>
+
+#include "app/log/replay_parts.hpp"
+#include "app/text/errors.hpp"
+#include "equipoise/runtime/fields.hpp"
+#include "equipoise/runtime/loop.hpp"
 
 namespace equipoise::app {
+namespace {
+
+std::uint64_t bits(double value) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits;
+}
+
+/// A number that the tick computed; the rest went into it, or is about the loop.
+struct Computed {
+  const char* channel;
+  const char* field;
+  int index;  // -1: it has none
+  double value;
+};
+
+/// In the order of the tick.
+std::vector<Computed> computed(const runtime::TickRecord& r) {
+  std::vector<Computed> out;
+  runtime::fields::each_message(r, [&](auto message, const char* channel, const auto& record) {
+    using Message = decltype(message);
+    if constexpr (std::is_same_v<Message, runtime::fields::State> ||
+                  std::is_same_v<Message, runtime::fields::Motors> ||
+                  std::is_same_v<Message, runtime::fields::Health>) {
+      Message::visit(record, [&](const char* field, const char*, const auto& value) {
+        if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
+          out.push_back({channel, field, -1, static_cast<double>(value)});
+        } else {
+          int i = 0;
+          for (const double element : value) out.push_back({channel, field, i++, element});
+        }
+      });
+    }
+  });
+  return out;
+}
+
+/// The log as a hardware boundary: its samples, one per tick; motor commands go nowhere.
+class LoggedIo {
+ public:
+  explicit LoggedIo(RunLog& log) : log_(log) {}
+
+  int wait_tick(std::int64_t* now_ns) noexcept {
+    try {
+      if (!log_.next(&now_)) return -ESHUTDOWN;
+    } catch (...) {
+      failure_ = std::current_exception();
+      return -EIO;
+    }
+    *now_ns = now_.now_ns;
+    return 0;
+  }
+  /// Why the log could not be read on, if it could not.
+  void rethrow() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
+  RawSample read() noexcept { return now_.raw; }
+  int write(const MotorCommand& /*command*/) noexcept { return 0; }
+  int motors_off() noexcept { return 0; }
+
+  const runtime::TickRecord& now() const noexcept { return now_; }
+
+ private:
+  RunLog& log_;
+  runtime::TickRecord now_{};
+  std::exception_ptr failure_;
+};
+
+/// The logged tick once more, for a firmware that follows the recorded run.
+class HandedOverIo {
+ public:
+  explicit HandedOverIo(const runtime::TickRecord& now) : now_(now) {}
+
+  int wait_tick(std::int64_t* now_ns) noexcept {
+    *now_ns = now_.now_ns;
+    return 0;
+  }
+  RawSample read() noexcept { return now_.raw; }
+  int write(const MotorCommand& /*command*/) noexcept { return 0; }
+  int motors_off() noexcept { return 0; }
+
+ private:
+  const runtime::TickRecord& now_;
+};
+
+/// What the runtime held against the motors, then.
+class LoggedSupervisor {
+ public:
+  /// `now`: the tick that is replayed.
+  explicit LoggedSupervisor(const runtime::TickRecord& now) : now_(now) {}
+  std::uint32_t begin(std::int64_t /*now_ns*/, const RawSample& /*raw*/) noexcept { return now_.inhibit; }
+  void end(bool /*driven*/, int /*write_error*/) noexcept {}
+
+ private:
+  const runtime::TickRecord& now_;
+};
+
+/// `follower`, where there is one: its record of the same tick into `retuned`.
+Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other, Firmware* follower) {
+  Replay out;
+  Retuned retuned;
+  LoggedIo io(log);
+  LoggedSupervisor supervisor(io.now());
+  HandedOverIo handed_over(io.now());
+  runtime::LoopEnd end;
+  std::int64_t expected = 0;
+  VerdictJudge judge;
+  const std::atomic<bool> never{false};
+  const auto commands_for = [&io](Firmware& of) {
+    return [&io, &of](std::int64_t, std::int64_t) {
+      if (io.now().has_truth) of.observe_truth(io.now().truth);
+      return command_of(io.now());
+    };
+  };
+  const auto follow = [&](std::int64_t, std::int64_t, const RawSample&, const Command&,
+                          const runtime::TickRecord& record) {
+    if (settled(io.now())) compare_tunings(io.now(), record, &retuned);
+  };
+  const auto on_tick = [&](std::int64_t, std::int64_t, const RawSample&, const Command&,
+                           const runtime::TickRecord& record) {
+    const runtime::TickRecord& tick = io.now();
+    out.missing += tick.tick - expected;
+    expected = tick.tick + 1;
+    compare(tick, record, &out.difference);
+    if (follower != nullptr)
+      runtime::run_tick(handed_over, *follower, commands_for(*follower), follow, supervisor, &end);
+    judge.observe(judged(tick));
+    if (!tick.has_truth || !settled(tick)) return;
+    out.logged.add(tick.estimate, tick.truth);
+    if (other) out.other.add(record.others[*other], tick.truth);
+  };
+  out.ticks = runtime::run_loop(io, firmware, commands_for(firmware), on_tick, never, supervisor).ticks;
+  io.rethrow();
+  out.verdict = log.end() ? Verdict::of(*log.end()) : judge.verdict(false, false);
+  out.incomplete = log.incomplete_ticks();
+  out.damaged_bytes = log.damaged_bytes();
+  if (follower != nullptr) out.retuned = retuned;
+  return out;
+}
+
+std::optional<std::size_t> index_of(const RobotType& robot, const std::string& estimator) {
+  const auto& names = robot.estimators;
+  const auto at = std::find(names.begin(), names.end(), estimator);
+  if (at == names.end()) return std::nullopt;
+  return static_cast<std::size_t>(at - names.begin());
+}
+
+}  // namespace
 
 void ReplayErrors::add(const runtime::StateRecord& x, const runtime::StateRecord& truth) {
   const auto square = [](double a) { return a * a; };
@@ -31,9 +190,80 @@ nlohmann::json Retuned::Figures::json(std::int64_t ticks, double radius_m) const
           {"saturated_fraction", static_cast<double>(saturated) / n}};
 }
 
+void compare(const runtime::TickRecord& logged, const runtime::TickRecord& replayed, Difference* difference) {
+  if (difference->found) return;
+  const std::vector<Computed> was = computed(logged);
+  const std::vector<Computed> is = computed(replayed);
+  for (std::size_t k = 0; k < is.size(); ++k) {
+    const Computed& c = is[k];
+    if (bits(was[k].value) == bits(c.value) || (std::isnan(was[k].value) && std::isnan(c.value))) continue;
+    const std::string index = c.index < 0 ? "" : "[" + std::to_string(c.index) + "]";
+    *difference = {true, logged.tick, std::string(c.channel) + "." + c.field + index, was[k].value, c.value};
+    return;
+  }
+}
+
+/// One tick of both into the comparison.
+void compare_tunings(const runtime::TickRecord& recorded, const runtime::TickRecord& retuned, Retuned* out) {
+  constexpr auto armed = static_cast<std::int32_t>(ArmState::kArmed);
+  if (recorded.arm_state != armed) return;
+  out->difference.add(retuned.estimate, recorded.estimate);
+  const auto mean_square = [](const runtime::TickRecord& r) {
+    double sum = 0.0;
+    for (int i = 0; i < r.motor_count; ++i) sum += std::pow(r.motors.duty[i], 2) / r.motor_count;
+    return sum;
+  };
+  const auto add = [&](const runtime::TickRecord& r, Retuned::Figures* figures) {
+    if (recorded.has_truth) figures->errors.add(r.estimate, recorded.truth);
+    figures->duty_squared += mean_square(r);
+    figures->innovation += r.estimate.normalized_innovation;
+    if (r.saturated) ++figures->saturated;
+  };
+  add(recorded, &out->recorded);
+  add(retuned, &out->changed);
+  if (retuned.arm_state == armed) return;
+  ++out->not_armed;
+  out->reasons |= retuned.reasons;
+}
+
+VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept {
+  const double tilt_rad = r.has_truth ? std::hypot(r.truth.theta_rad[0], r.truth.theta_rad[1]) : std::nan("");
+  const double simulated_s = 1e-9 * static_cast<double>(r.now_ns);
+  return {r.has_truth ? simulated_s : static_cast<double>(r.tick) * kTickS, r.arm,
+          r.arm_state == static_cast<std::int32_t>(ArmState::kArmed), r.reasons, tilt_rad};
+}
+
+bool settled(const runtime::TickRecord& r) noexcept {
+  return r.has_truth ? r.now_ns >= 5'000'000'000 : r.tick >= 1000;
+}
+
+Replay replay_as(const RobotType& robot, RunLog& log, const std::string& origin, const Beside& beside) {
+  const runtime::RunInfo& info = log.run();
+  Choice choice{info.estimator, info.controller, info.fidelity, false, info.attitude, info.backend};
+  complete(robot, &choice);
+  Choice asked = choice;
+  if (!beside.estimator.empty()) {
+    asked.estimator = beside.estimator;
+    complete(robot, &asked);
+  }
+  const std::string where = origin + " (its configuration)";
+  const auto recorded = robot.parse(info.config_toml, where, {});
+  Replay r;
+  if (beside.set.empty()) {
+    choice.compare = !beside.estimator.empty();
+    r = replay(log, *recorded->firmware(choice),
+               choice.compare ? index_of(robot, beside.estimator) : std::nullopt, nullptr);
+  } else {
+    const auto changed = robot.parse(info.config_toml, where, beside.set);
+    const Retuning both = recorded->retuning(choice, *changed, asked);
+    r = replay(log, *both.recorded, std::nullopt, both.changed.get());
+  }
+  if (r.ticks == 0) throw InputError(origin + ": holds no whole tick");
+  return r;
+}
+
 Replay replay_log(RunLog& log, const std::string& origin, const Beside& beside) {
-  return with_robot(log.run().robot, origin,
-                    [&](auto firmware) { return replay_as<decltype(firmware)>(log, origin, beside); });
+  return replay_as(robot_type_of(log.run().robot, origin), log, origin, beside);
 }
 
 }  // namespace equipoise::app

@@ -10,6 +10,7 @@
 
 #include "app/log/run_log.hpp"
 #include "app/text/json.hpp"
+#include "app/trial/firmware.hpp"
 #include "app/trial/verdict.hpp"
 
 namespace equipoise::app {
@@ -74,5 +75,7 @@ struct Beside {
 
 /// `origin` names the log in errors.
 Replay replay_log(RunLog& log, const std::string& origin, const Beside& beside);
+/// The same, of a robot that need not be one of this build.
+Replay replay_as(const RobotType& robot, RunLog& log, const std::string& origin, const Beside& beside = {});
 
 }  // namespace equipoise::app

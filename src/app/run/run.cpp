@@ -4,10 +4,12 @@
 #include "app/board/board.hpp"
 #include "app/board/self_test.hpp"
 #include "app/cli/commands.hpp"
+#include "app/cli/interrupt.hpp"
 #include "app/io/lockstep.hpp"
 #include "app/io/plant_backend.hpp"
 #include "app/io/practice_backend.hpp"
 #include "app/run/runner.hpp"
+#include "app/run/wires.hpp"
 #include "app/trial/log_name.hpp"
 #include "bbb.h"
 #include "config/population.hpp"
@@ -30,9 +32,8 @@ const char* name_of(LockstepEnd end) {
   return "finished";
 }
 
-template <class Firmware>
-int run_lockstep(const RunArguments& a) {
-  Runner<Firmware> runner(a, a.set, "");
+int run_lockstep(const RunArguments& a, const RobotType& robot) {
+  Runner runner(a, robot, a.set, "");
   const LockstepServer server(a.socket);
   std::fprintf(stderr, "waiting for a physics engine on %s\n", a.socket.c_str());
   std::optional<runtime::Supervisor> supervisor;
@@ -52,7 +53,7 @@ int run_lockstep(const RunArguments& a) {
       last.trial.verdict.ended = Ended::kDevice;
       break;
     }
-    Lockstep engine(fd, runner.calibration(), a.timeout_s);
+    Lockstep engine(fd, runner.robot().calibration, a.timeout_s);
     last = runner.run(engine.io(), ++trials, nullptr, begin);
     if (engine.end() != LockstepEnd::kRunning && engine.end() != LockstepEnd::kFinished &&
         last.end != "fell") {
@@ -62,21 +63,20 @@ int run_lockstep(const RunArguments& a) {
     if (engine.end() != LockstepEnd::kPeerGone || interrupted.load()) break;
     std::fprintf(stderr, "equipoise: %s; motors are off, waiting for another\n", last.error.c_str());
   }
-  return report(a, Firmware::kName, last, trials, runner.sha256(), nullptr);
+  return report(a, robot.name, last, trials, runner.robot().sha256, nullptr);
 }
 
 /// What `sim` simulates, behind what the board runs.
-template <class Firmware>
-int run_simulated(const RunArguments& a) {
-  Runner<Firmware> runner(
-      a,
+int run_simulated(const RunArguments& a, const RobotType& robot) {
+  Runner runner(
+      a, robot,
       config::with_robot_drawn(config::draw_robot(a.config, a.set, a.choice.fidelity, a.robot_number),
                                a.choice.fidelity, a.set),
       "");
   std::vector<PlannedFault> faults;
   for (const std::string& text : a.faults) faults.push_back(planned_fault(text));
-  auto world = Firmware::world(runner.config(), fidelity_level(a.choice.fidelity), a.seed);
-  PlantBackend simulated(world);
+  const auto world = runner.robot().world(a.choice, a.seed);
+  PlantBackend simulated(*world);
   PracticeBackend practice(simulated.io(), a.speed, faults, a.seed);
   std::optional<runtime::Supervisor> supervisor;
   const Outcome outcome =
@@ -84,15 +84,15 @@ int run_simulated(const RunArguments& a) {
         const std::atomic<bool>& failed = practice.breaks_log() ? practice.log_failed() : log_failed;
         return supervisor.emplace(runtime::Watched{nullptr, 0, &failed, true});  // simulated time
       });
-  return report(a, Firmware::kName, outcome, 1, runner.sha256(), nullptr);
+  return report(a, robot.name, outcome, 1, runner.robot().sha256, nullptr);
 }
 
-template <class Firmware>
-int run_board(const RunArguments& a, const Board& board, const std::string& board_toml) {
+int run_board(const RunArguments& a, const RobotType& robot, const Board& board,
+              const std::string& board_toml) {
   const Overrides overrides = overrides_of(board, a.set);
   // Before the receiver's thread, and before the board is opened.
   RealtimeSession session(a.session, missing_calibration(board));
-  Runner<Firmware> runner(a, overrides, board_toml);
+  Runner runner(a, robot, overrides, board_toml);
   rio_t io{};
   bbb_error_t error{};
   bbb_config_t wiring = board.wiring;
@@ -113,7 +113,7 @@ int run_board(const RunArguments& a, const Board& board, const std::string& boar
   session.end();
   if (outcome.end == "device")
     outcome.error = std::string("the board's tick failed: ") + std::strerror(-outcome.trial.error);
-  return report(a, Firmware::kName, outcome, 1, runner.sha256(), session.summary());
+  return report(a, robot.name, outcome, 1, runner.robot().sha256, session.summary());
 }
 
 int run(RunArguments a) {
@@ -122,28 +122,23 @@ int run(RunArguments a) {
   if (a.backend == "lockstep" && a.socket.empty()) throw InputError("--backend lockstep needs --socket PATH");
   if (a.backend == "board" && a.board.empty())
     throw InputError("--backend board needs --board FILE, e.g. config/boards/robotics_cape_mbbr.toml");
-  const std::string robot = robot_type(a.config);
-  if (a.log.empty()) a.log = new_log_name(a.backend, robot);
+  const RobotType& robot = robot_type_of(robot_type(a.config), a.config);
+  if (a.log.empty()) a.log = new_log_name(a.backend, robot.name);
   a.session.board_path = a.board;
   watch_interrupts();
-  return with_robot(robot, a.config, [&](auto firmware) {
-    using Firmware = decltype(firmware);
-    complete<Firmware>(a.choice);
-    if (a.choice.estimator == "truth")
-      throw InputError("--estimator truth: only a simulation knows the truth");
-    if (a.backend == "lockstep") return run_lockstep<Firmware>(a);
-    if (a.backend == "sim") return run_simulated<Firmware>(a);
-    const Board board = load_board(a.board);
-    const bool wired_for_it = board.robot == Firmware::kName;
-    if (!wired_for_it) {
-      throw InputError(a.board + ": board.robot: \"" + board.robot + "\" where " + a.config + " says \"" +
-                       Firmware::kName + "\"");
-    }
-    if (a.command_url == "serial")
-      a.command_url = "serial:" + board.serial_device + ":" + std::to_string(board.serial_baud);
-    if (a.command_url == "can") a.command_url = "can:" + board.can_interface;
-    return run_board<Firmware>(a, board, read_text(a.board));
-  });
+  complete(robot, &a.choice);
+  if (a.choice.estimator == "truth") throw InputError("--estimator truth: only a simulation knows the truth");
+  if (a.backend == "lockstep") return run_lockstep(a, robot);
+  if (a.backend == "sim") return run_simulated(a, robot);
+  const Board board = load_board(a.board);
+  if (board.robot != robot.name) {
+    throw InputError(a.board + ": board.robot: \"" + board.robot + "\" where " + a.config + " says \"" +
+                     robot.name + "\"");
+  }
+  if (a.command_url == "serial")
+    a.command_url = "serial:" + board.serial_device + ":" + std::to_string(board.serial_baud);
+  if (a.command_url == "can") a.command_url = "can:" + board.can_interface;
+  return run_board(a, robot, board, read_text(a.board));
 }
 
 }  // namespace

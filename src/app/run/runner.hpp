@@ -1,130 +1,40 @@
-// Runs trials of one robot: configuration, pipeline, commands, telemetry, then one loop per trial. In:
+// Runs trials of one robot: configuration, firmware, commands, telemetry, then one loop per trial. In:
 // arguments, overrides, an open backend, who supervises -> out: Outcome.
 #pragma once
 
-#include <cstdio>
-#include <filesystem>
 #include <functional>
+#include <memory>
 
-#include "app/cli/key_file.hpp"
-#include "app/guard/service_notify.hpp"
-#include "app/io/hardware.hpp"
-#include "app/remote/hand_remote.hpp"
 #include "app/run/panel.hpp"
 #include "app/run/run_arguments.hpp"
-#include "app/run/trial_observer.hpp"
-#include "app/run/wires.hpp"
+#include "app/run/status_indicator.hpp"
 #include "app/trial/script.hpp"
-#include "equipoise/runtime/command_receiver.hpp"
+#include "equipoise/runtime/remote.hpp"
+#include "equipoise/runtime/supervisor.hpp"
+#include "robot_io.h"
 
 namespace equipoise::app {
 
 /// In the loop's thread, just before its first tick.
 using BeginSupervision = std::function<runtime::Supervisor&(const std::atomic<bool>& log_failed)>;
 
-/// Who commands, in the journal.
-inline void say_on_stderr(const std::string& what) { std::fprintf(stderr, "equipoise: %s\n", what.c_str()); }
-
-/// run.lcm, run-2.lcm, run-3.lcm: a new engine is a new trial.
-inline std::string numbered(const std::string& path, int trial) {
-  if (trial == 1 || path == "off") return path;
-  const std::filesystem::path p(path);
-  return (p.parent_path() / (p.stem().string() + "-" + std::to_string(trial) + p.extension().string()))
-      .string();
-}
-
-template <class Firmware>
 class Runner {
  public:
-  Runner(const RunArguments& a, const Overrides& overrides, const std::string& board_toml)
-      : a_(a),
-        loaded_(Firmware::load(a.config, overrides)),
-        config_(Firmware::apply(loaded_.config, a.choice)),
-        board_toml_(board_toml),
-        script_(script_for<Firmware>(loaded_.config, a.drive_mps, 2.0 * kPi * a.yaw_hz, a.path)) {
-    script_.arm = a.arm;
-    if (!a.command_key.empty()) {
-      remote_ = std::make_unique<runtime::CommandReceiver>(
-          load_robot_key(a.command_key),
-          runtime::CommandReceiverOptions{a.robot_name, config_.safety.command_timeout_s, say_on_stderr},
-          open_wire(a.command_url, runtime::WireSide::kRobot));
-    } else if (!a.remote.empty()) {
-      const RemoteFile file = load_remote(a.remote);
-      remote_ = std::make_unique<HandRemote>(
-          open_hand(file),
-          HandRemote::Options{file.speed_m_s, file.turn_hz, config_.safety.command_timeout_s, say_on_stderr});
-    }
-  }
+  Runner(const RunArguments& a, const RobotType& robot, const Overrides& overrides,
+         const std::string& board_toml);
 
-  const typename Firmware::Config& config() const { return config_; }
-  const Calibration& calibration() const { return config_.calibration; }
-  const std::string& sha256() const { return loaded_.sha256; }
+  const ConfiguredRobot& robot() const { return *robot_; }
   void obey(Panel* panel) { panel_ = panel; }
 
-  Outcome run(rio_t io, int number, StatusIndicator* indicator, const BeginSupervision& begin) {
-    runtime::Telemetry telemetry(telemetry_options(number));
-    ServiceNotify service;
-    const auto commands = [&](std::int64_t tick, std::int64_t) {
-      service.note(tick);
-      const Command asked = remote_ ? remote_->latest() : script_.at(static_cast<double>(tick + 1) * kTickS);
-      return panel_ != nullptr ? panel_->limit(asked) : asked;
-    };
-    Hardware hardware(io);
-    const Trial trial = Firmware::with_pipeline(config_, a_.choice.controller, [&](auto& pipeline) {
-      runtime::Supervisor& supervisor = begin(telemetry.log_failed());
-      TrialObserver observe(pipeline, supervisor, telemetry, indicator, {a_.duration_s, !on_board()});
-      const auto on_tick = [&](std::int64_t tick, std::int64_t now_ns, const RawSample& raw,
-                               const Command& command, const auto& t) {
-        observe(tick, now_ns, raw, command, t);
-        if (remote_) remote_->tell(t.arm_state);
-      };
-      return observe.trial(
-          runtime::run_loop(hardware, pipeline, commands, on_tick, observe.done(), supervisor));
-    });
-    return outcome(trial, telemetry.finish(trial.verdict.record()), number);
-  }
+  Outcome run(rio_t io, int number, StatusIndicator* indicator, const BeginSupervision& begin);
 
  private:
   bool on_board() const { return a_.backend == "board"; }
-
-  runtime::TelemetryOptions telemetry_options(int number) const {
-    runtime::TelemetryOptions options;
-    options.log_path = a_.log == "off" ? "" : numbered(a_.log, number);
-    options.keep_previous = true;
-    options.url = a_.telemetry == "off" ? "" : a_.telemetry;
-    if (a_.choice.compare) options.estimators = Firmware::estimators();
-    options.max_log_bytes = a_.log_max_mb * 1000000;
-    options.min_free_bytes = a_.log_min_free_mb * 1000000;
-    options.sync = on_board();
-    options.wait_when_full = !on_board();  // an engine may run faster than the disk
-    options.run =
-        run_info<Firmware>(loaded_, a_.choice, a_.backend == "sim" ? static_cast<std::int64_t>(a_.seed) : 0);
-    options.run.backend = a_.backend;
-    options.run.board_toml = board_toml_;
-    return options;
-  }
-
-  Outcome outcome(const Trial& trial, const runtime::TelemetryReport& written, int number) const {
-    Outcome out;
-    out.trial = trial;
-    out.log = numbered(a_.log, number);
-    if (!written.warning.empty() && number == 1)
-      std::fprintf(stderr, "equipoise: warning: %s\n", written.warning.c_str());
-    const bool ended_well = trial.error == 0 || trial.error == -ESHUTDOWN;
-    out.end = interrupted.load()                                        ? "interrupted"
-              : trial.verdict.fell() && trial.armed && trial.error == 0 ? "fell"
-              : ended_well                                              ? "finished"
-                                                                        : "device";
-    if (!written.log_error.empty()) {
-      out.end = "log";
-      out.error = written.log_error;
-    }
-    return out;
-  }
+  runtime::TelemetryOptions telemetry_options(int number) const;
+  Outcome outcome(const Trial& trial, const runtime::TelemetryReport& written, int number) const;
 
   const RunArguments& a_;
-  typename Firmware::Loaded loaded_;
-  typename Firmware::Config config_;
+  std::unique_ptr<const ConfiguredRobot> robot_;
   std::string board_toml_;
   Script script_;
   std::unique_ptr<runtime::Remote> remote_;  // null: the script

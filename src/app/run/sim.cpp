@@ -29,9 +29,8 @@ std::string shown(const char* format, double value) {
   return std::isnan(value) ? "       -" : text;
 }
 
-template <class Firmware>
-void print_summary(std::FILE* out, const SimRequest& r, const SimSummary& s) {
-  std::fprintf(out, "%s  (%s, %s, %s, %s, seed %llu)\n", s.verdict.sentence().c_str(), Firmware::kName,
+void print_summary(std::FILE* out, const RobotType& robot, const SimRequest& r, const SimSummary& s) {
+  std::fprintf(out, "%s  (%s, %s, %s, %s, seed %llu)\n", s.verdict.sentence().c_str(), robot.name,
                r.choice.estimator.c_str(), r.choice.controller.c_str(), r.choice.fidelity.c_str(),
                static_cast<unsigned long long>(r.seed));
   const auto line = [out](const char* label, const std::string& value, const char* unit) {
@@ -39,8 +38,7 @@ void print_summary(std::FILE* out, const SimRequest& r, const SimSummary& s) {
   };
   line("yaw rate", shown("%8.3f", s.yaw_rate_mean_hz), "Hz");
   line("attitude RMSE", shown("%8.4f", s.controlling.attitude_rmse_rad), "rad");
-  line(Firmware::kSpeedLabel, shown("%7.2f", Firmware::kSpeedScale * s.controlling.speed_rmse),
-       Firmware::kSpeedUnit);
+  line(robot.speed_label, shown("%7.2f", robot.speed_scale * s.controlling.speed_rmse), robot.speed_unit);
   line("position RMSE", shown("%8.3f", s.position_rmse_m), "m");
   if (!r.path.empty()) line("off the path", shown("%8.3f", s.path_rmse_m), "m RMS");
   line("heading error", shown("%8.3f", s.heading_error_rad), "rad, at the end");
@@ -48,10 +46,10 @@ void print_summary(std::FILE* out, const SimRequest& r, const SimSummary& s) {
                100.0 * s.saturated_fraction);
   std::fprintf(out, "  simulated at    %8.0f x real time\n", s.real_time_factor);
   if (s.estimators.size() > 1) {
-    std::fprintf(out, "  %-18s %14s %12s, %s\n", "estimator", "attitude, rad", "speed", Firmware::kSpeedUnit);
+    std::fprintf(out, "  %-18s %14s %12s, %s\n", "estimator", "attitude, rad", "speed", robot.speed_unit);
     for (const auto& [name, e] : s.estimators) {
       std::fprintf(out, "  %-18s %14s %18s\n", name.c_str(), shown("%.4f", e.attitude_rmse_rad).c_str(),
-                   shown("%.2f", Firmware::kSpeedScale * e.speed_rmse).c_str());
+                   shown("%.2f", robot.speed_scale * e.speed_rmse).c_str());
     }
   }
 }
@@ -86,29 +84,28 @@ class Pace {
   double next_line_s_ = 0.0;
 };
 
-template <class Firmware>
-int simulate_as(Arguments a) {
+int run_sim(Arguments a) {
   SimRequest& request = a.request;
-  const typename Firmware::Loaded loaded = load_for<Firmware>(&request);
-  if (a.log.empty()) a.log = new_log_name("sim", Firmware::kName);
+  const auto robot = load_for(&request);
+  if (a.log.empty()) a.log = new_log_name("sim", robot->type->name);
 
   runtime::TelemetryOptions telemetry_options;
   telemetry_options.log_path = a.log == "off" ? "" : a.log;
   telemetry_options.url = a.telemetry == "off" ? "" : a.telemetry;
   telemetry_options.wait_when_full = !a.realtime;
   if (a.realtime) telemetry_options.max_publish_hz = 2.0 * kTickHz;
-  telemetry_options.estimators = Firmware::estimators();
-  telemetry_options.run = run_info<Firmware>(loaded, request.choice, static_cast<std::int64_t>(request.seed));
+  telemetry_options.estimators = robot->type->estimators;
+  telemetry_options.run = run_info(*robot, request.choice, static_cast<std::int64_t>(request.seed));
   telemetry_options.run.backend = "sim";
   runtime::Telemetry telemetry(telemetry_options);
 
-  SimOptions options = options_for<Firmware>(request, loaded.config);
+  SimOptions options = options_for(request, *robot);
   watch_interrupts();
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   Pace pace(a.realtime, options.duration_s, stderr);
   options.log_failed = &telemetry.log_failed();
-  const SimSummary summary = simulate<Firmware>(
-      loaded.config, request.choice, options,
+  const SimSummary summary = simulate(
+      *robot, request.choice, options,
       [&](const runtime::TickRecord& record) {
         telemetry.hand_over(record);
         pace.show(record);
@@ -118,10 +115,10 @@ int simulate_as(Arguments a) {
   const runtime::TelemetryReport report = telemetry.finish(summary.verdict.record());
   if (!report.warning.empty()) std::fprintf(stderr, "equipoise: warning: %s\n", report.warning.c_str());
 
-  print_summary<Firmware>(out, request, summary);
+  print_summary(out, *robot->type, request, summary);
   std::fprintf(out, "  log             %s\n", a.log.c_str());
   if (!a.json.empty()) {
-    nlohmann::json json = app::to_json<Firmware>(request, summary, loaded.sha256);
+    nlohmann::json json = app::to_json(request, summary, *robot);
     json["log"] = a.log;
     write_json(json, a.json);
   }
@@ -130,11 +127,6 @@ int simulate_as(Arguments a) {
     return 1;
   }
   return summary.verdict.fell() ? 1 : 0;
-}
-
-int run_sim(const Arguments& a) {
-  return with_robot(robot_type(a.request.config), a.request.config,
-                    [&](auto firmware) { return simulate_as<decltype(firmware)>(a); });
 }
 
 }  // namespace

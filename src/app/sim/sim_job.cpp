@@ -1,6 +1,8 @@
 #include "app/sim/sim_job.hpp"
 
 #include "app/text/errors.hpp"
+#include "app/text/reasons.hpp"
+#include "app/text/version.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -33,6 +35,66 @@ void check(const SimRequest& r) {
     throw InputError("attitude: \"" + r.choice.attitude + "\" is not known; allowed: dmp, own");
   if (!r.path.empty() && r.yaw_rate_rad_s != 0.0)
     throw InputError("path and yaw_hz exclude each other: the path says how the robot turns");
+}
+
+std::unique_ptr<const ConfiguredRobot> load_for(SimRequest* request, std::vector<config::Drawn>* drawn) {
+  const RobotType& type = robot_type_of(robot_type(request->config), request->config);
+  complete(type, &request->choice);
+  const std::vector<config::Drawn> robot =
+      config::draw_robot(request->config, request->set, request->choice.fidelity, request->robot);
+  if (drawn != nullptr) *drawn = robot;
+  return type.load(request->config, config::with_robot_drawn(robot, request->choice.fidelity, request->set));
+}
+
+SimOptions options_for(const SimRequest& request, const ConfiguredRobot& robot) {
+  SimOptions options;
+  options.script = script_for(robot, request.drive_mps, request.yaw_rate_rad_s, request.path);
+  options.duration_s = request.duration_s;
+  options.seed = request.seed;
+  return options;
+}
+
+nlohmann::json figures(const RobotType& robot, const SimSummary& s) {
+  nlohmann::json out{{"attitude_rmse_rad", s.controlling.attitude_rmse_rad},
+                     {robot.speed_rmse_key, s.controlling.speed_rmse},
+                     {"yaw_frame_speed_rmse_m_s", s.yaw_frame_speed_rmse_m_s},
+                     {"heading_error_rad", s.heading_error_rad},
+                     {"position_rmse_m", s.position_rmse_m},
+                     {"normalized_innovation_mean", s.normalized_innovation_mean},
+                     {"yaw_rate_mean_hz", s.yaw_rate_mean_hz},
+                     {"duty_max", s.duty_max},
+                     {"saturated_fraction", s.saturated_fraction},
+                     {"degraded", degraded_names(s.degraded)}};
+  s.verdict.write(&out);
+  return out;
+}
+
+nlohmann::json to_json(const SimRequest& request, const SimSummary& s, const ConfiguredRobot& robot) {
+  nlohmann::json estimators = nlohmann::json::object();
+  for (const auto& [name, errors] : s.estimators) {
+    estimators[name] = {{"attitude_rmse_rad", errors.attitude_rmse_rad},
+                        {robot.type->speed_rmse_key, errors.speed_rmse}};
+  }
+  nlohmann::json out{{"robot", robot.type->name},
+                     {"robot_number", request.robot},
+                     {"seed", request.seed},
+                     {"estimator", request.choice.estimator},
+                     {"controller", request.choice.controller},
+                     {"fidelity", request.choice.fidelity},
+                     {"attitude", request.choice.attitude},
+                     {"yaw_hz", request.yaw_rate_rad_s / (2.0 * kPi)},
+                     {"drive_mps", request.drive_mps},
+                     {"duration_s", static_cast<double>(s.ticks) * kTickS},
+                     {"path", request.path.empty() ? nlohmann::json(nullptr) : nlohmann::json(request.path)},
+                     {"path_rmse_m", s.path_rmse_m},
+                     {"ticks", s.ticks},
+                     {"real_time_factor", s.real_time_factor},
+                     {"interrupted", s.verdict.ended == Ended::kInterrupted},
+                     {"estimators", estimators},
+                     {"config_sha256", robot.sha256},
+                     {"version", version()}};
+  out.update(figures(*robot.type, s));
+  return out;
 }
 
 }  // namespace equipoise::app

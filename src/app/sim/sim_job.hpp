@@ -8,7 +8,6 @@
 
 #include "app/sim/simulate.hpp"
 #include "app/text/json.hpp"
-#include "app/text/reasons.hpp"
 #include "config/population.hpp"
 
 namespace equipoise::app {
@@ -36,72 +35,16 @@ void check(const SimRequest& request);
 
 /// Completes the request's choices; ConfigError where they or the configuration are wrong. `drawn`, where
 /// wanted: the robot's imperfections.
-template <class Firmware>
-typename Firmware::Loaded load_for(SimRequest* request, std::vector<config::Drawn>* drawn = nullptr) {
-  complete<Firmware>(request->choice);
-  const std::vector<config::Drawn> robot =
-      config::draw_robot(request->config, request->set, request->choice.fidelity, request->robot);
-  if (drawn != nullptr) *drawn = robot;
-  return Firmware::load(request->config,
-                        config::with_robot_drawn(robot, request->choice.fidelity, request->set));
-}
+std::unique_ptr<const ConfiguredRobot> load_for(SimRequest* request,
+                                                std::vector<config::Drawn>* drawn = nullptr);
 
-template <class Firmware>
-SimOptions options_for(const SimRequest& request, const typename Firmware::Config& config) {
-  SimOptions options;
-  options.script = script_for<Firmware>(config, request.drive_mps, request.yaw_rate_rad_s, request.path);
-  options.duration_s = request.duration_s;
-  options.seed = request.seed;
-  return options;
-}
+SimOptions options_for(const SimRequest& request, const ConfiguredRobot& robot);
 
 /// One number by name; elements of an array are name[0], name[1], ...
 nlohmann::json by_name(const std::vector<config::Drawn>& drawn);
 
 /// What a run came to, without what was asked for. NaN, never counted, is written as null.
-template <class Firmware>
-nlohmann::json figures(const SimSummary& s) {
-  nlohmann::json out{{"attitude_rmse_rad", s.controlling.attitude_rmse_rad},
-                     {Firmware::kSpeedRmseKey, s.controlling.speed_rmse},
-                     {"yaw_frame_speed_rmse_m_s", s.yaw_frame_speed_rmse_m_s},
-                     {"heading_error_rad", s.heading_error_rad},
-                     {"position_rmse_m", s.position_rmse_m},
-                     {"normalized_innovation_mean", s.normalized_innovation_mean},
-                     {"yaw_rate_mean_hz", s.yaw_rate_mean_hz},
-                     {"duty_max", s.duty_max},
-                     {"saturated_fraction", s.saturated_fraction},
-                     {"degraded", degraded_names(s.degraded)}};
-  s.verdict.write(&out);
-  return out;
-}
-
-template <class Firmware>
-nlohmann::json to_json(const SimRequest& request, const SimSummary& s, const std::string& config_sha256) {
-  nlohmann::json estimators = nlohmann::json::object();
-  for (const auto& [name, errors] : s.estimators) {
-    estimators[name] = {{"attitude_rmse_rad", errors.attitude_rmse_rad},
-                        {Firmware::kSpeedRmseKey, errors.speed_rmse}};
-  }
-  nlohmann::json out{{"robot", Firmware::kName},
-                     {"robot_number", request.robot},
-                     {"seed", request.seed},
-                     {"estimator", request.choice.estimator},
-                     {"controller", request.choice.controller},
-                     {"fidelity", request.choice.fidelity},
-                     {"attitude", request.choice.attitude},
-                     {"yaw_hz", request.yaw_rate_rad_s / (2.0 * kPi)},
-                     {"drive_mps", request.drive_mps},
-                     {"duration_s", static_cast<double>(s.ticks) * kTickS},
-                     {"path", request.path.empty() ? nlohmann::json(nullptr) : nlohmann::json(request.path)},
-                     {"path_rmse_m", s.path_rmse_m},
-                     {"ticks", s.ticks},
-                     {"real_time_factor", s.real_time_factor},
-                     {"interrupted", s.verdict.ended == Ended::kInterrupted},
-                     {"estimators", estimators},
-                     {"config_sha256", config_sha256},
-                     {"version", version()}};
-  out.update(figures<Firmware>(s));
-  return out;
-}
+nlohmann::json figures(const RobotType& robot, const SimSummary& s);
+nlohmann::json to_json(const SimRequest& request, const SimSummary& s, const ConfiguredRobot& robot);
 
 }  // namespace equipoise::app

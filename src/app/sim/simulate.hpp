@@ -16,15 +16,14 @@ struct SimOptions {
   Script script;
   double duration_s = 30.0;
   std::uint64_t seed = 1;
+  bool figures = true;                            // false: only the verdict
   const std::atomic<bool>* log_failed = nullptr;  // then the motors stop: nothing runs unrecorded
 };
 
 using TickObserver = std::function<void(const runtime::TickRecord&)>;
 
-/// `choice.fidelity` names the world, `choice.controller` the pipeline. Defined in simulated_run.hpp,
-/// instantiated once per robot in simulate_*.cpp.
-template <class Firmware>
-SimSummary simulate(const typename Firmware::Config& configured, const Choice& choice,
-                    const SimOptions& options, const TickObserver& observe, const std::atomic<bool>& stop);
+/// `choice.fidelity` names the world, `choice.controller` the pipeline.
+SimSummary simulate(const ConfiguredRobot& robot, const Choice& choice, const SimOptions& options,
+                    const TickObserver& observe, const std::atomic<bool>& stop);
 
 }  // namespace equipoise::app

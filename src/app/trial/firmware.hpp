@@ -1,107 +1,130 @@
-// What sim, run and replay share of a robot's firmware: checked choices, the log's first event, the tick's
-// record. In: configuration, choices, results -> out: the same as records. record_tick is RT-safe, the rest
-// is start-up only.
+// A robot's firmware and its simulated world, whatever the robot: what sim, run, replay and campaigns work
+// with. In: configuration, choices -> out: one virtual call per tick. tick() is RT-safe, the rest is start-up
+// and simulation.
 #pragma once
 
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "app/text/version.hpp"
+#include "equipoise/actuate/safety.hpp"
 #include "equipoise/config.hpp"
+#include "equipoise/overrides.hpp"
 #include "equipoise/runtime/record.hpp"
-#include "robots/robot_list.hpp"
+#include "equipoise/sense/calibrate.hpp"
+#include "robots/choice.hpp"
 
 namespace equipoise::app {
 
 // Of the robots, for what is qualified with app::.
 using equipoise::Choice;
 using equipoise::fidelity_level;
-using equipoise::MbbrFirmware;
-using equipoise::MipFirmware;
-using equipoise::with_robot;
+
+/// A simulated robot and its surroundings.
+class World {
+ public:
+  World() = default;
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+  virtual ~World() = default;
+
+  /// One tick with the bridges as commanded.
+  virtual void advance(const MotorCommand& command) = 0;
+  virtual RawSample sense() = 0;
+  /// No packets of the attitude source, where nobody reads them.
+  virtual void without_attitude() noexcept = 0;
+  virtual double time_s() const noexcept = 0;
+  /// With the dimensions that the firmware is configured with.
+  virtual StateView truth() const noexcept = 0;
+};
+
+/// One configured pipeline.
+class Firmware {
+ public:
+  Firmware() = default;
+  Firmware(const Firmware&) = delete;
+  Firmware& operator=(const Firmware&) = delete;
+  virtual ~Firmware() = default;
+
+  /// Everything of the tick but its number, its timing and the truth.
+  virtual runtime::TickRecord tick(const RawSample& raw, const Command& asked,
+                                   const LoopState& loop) noexcept = 0;
+
+  /// `estimator`: its place in RobotType::estimators. One that runs is in TickRecord::others.
+  virtual bool runs(std::size_t estimator) const noexcept = 0;
+  virtual bool reads_attitude() const noexcept = 0;
+  virtual StateErrors errors_of(const StateView& x, const StateView& truth) const noexcept = 0;
+
+  /// What the estimator `truth` returns from now on; of a world of the same robot, or of a log, where that
+  /// holds all of it.
+  virtual void observe_truth(const World& world) noexcept = 0;
+  virtual void observe_truth(const runtime::StateRecord& logged) noexcept = 0;
+};
+
+struct RobotType;
+
+/// Firmware of a recorded run and, beside it, of another tuning, whose estimators take the inputs that those
+/// of the first one were given: tick by tick, `recorded` first.
+struct Retuning {
+  std::unique_ptr<Firmware> recorded, changed;
+};
+
+/// A robot's configuration as it was read.
+class ConfiguredRobot {
+ public:
+  ConfiguredRobot() = default;
+  ConfiguredRobot(const ConfiguredRobot&) = delete;
+  ConfiguredRobot& operator=(const ConfiguredRobot&) = delete;
+  virtual ~ConfiguredRobot() = default;
+
+  virtual std::unique_ptr<Firmware> firmware(const Choice& choice) const = 0;
+  /// `choice.fidelity` names the world.
+  virtual std::unique_ptr<World> world(const Choice& choice, std::uint64_t seed) const = 0;
+  /// `changed`: of the same robot type, under the same controller.
+  virtual Retuning retuning(const Choice& choice, const ConfiguredRobot& changed,
+                            const Choice& changed_choice) const = 0;
+
+  const RobotType* type = nullptr;
+  std::string sha256, toml;
+  std::vector<KeyFacts> keys;
+  Calibration calibration;
+  SafetyParams safety;
+  double rolling_radius_m = 0.0;
+  double max_acceleration_m_s2 = 0.0;
+};
+
+/// A robot of this build.
+struct RobotType {
+  const char* name;
+  std::vector<std::string> estimators, controllers;
+  const char* default_estimator;
+  const char* default_controller;
+  const char* speed_rmse_key;
+  const char* speed_label;
+  const char* speed_unit;
+  double speed_scale;  // to that unit
+  bool drives_sideways;
+  double forward_rad;  // heading of a drive forward at yaw 0, from x
+  std::unique_ptr<const ConfiguredRobot> (*load)(const std::string& path, const Overrides& overrides);
+  std::unique_ptr<const ConfiguredRobot> (*parse)(const std::string& text, const std::string& origin,
+                                                  const std::vector<std::string>& set);
+};
+
+/// Robot types of this build, and the one of this name; ConfigError when there is none. `where`: file, for
+/// the message.
+const std::vector<const RobotType*>& robot_types();
+const RobotType& robot_type_of(const std::string& name, const std::string& where);
+/// As its file says.
+std::unique_ptr<const ConfiguredRobot> load_robot(const std::string& path, const Overrides& overrides);
 
 /// Of all robots, for help texts: "mbbr: a, b".
 std::string known_estimators();
 std::string known_controllers();
 
 /// ConfigError unless estimator and controller are known to this robot; empty ones become its defaults.
-template <class Firmware>
-void complete(Choice& choice) {
-  const auto check = [](const std::string& what, const std::string& value,
-                        const std::vector<std::string>& names) {
-    std::string allowed;
-    for (const std::string& name : names) {
-      if (name == value) return;
-      allowed += (allowed.empty() ? "" : ", ") + name;
-    }
-    throw ConfigError("--" + what + " " + value + ": not known to " + Firmware::kName +
-                      "; allowed: " + allowed);
-  };
-  if (choice.estimator.empty()) choice.estimator = Firmware::kDefaultEstimator;
-  if (choice.controller.empty()) choice.controller = Firmware::kDefaultController;
-  check("estimator", choice.estimator, Firmware::estimators());
-  check("controller", choice.controller, Firmware::controllers());
-}
+void complete(const RobotType& robot, Choice* choice);
 
 /// First event of the log.
-template <class Firmware>
-runtime::RunInfo run_info(const typename Firmware::Loaded& loaded, const Choice& choice, std::int64_t seed) {
-  runtime::RunInfo run;
-  run.attitude = choice.attitude;
-  run.robot = Firmware::kName;
-  run.estimator = choice.estimator;
-  run.controller = choice.controller;
-  run.fidelity = choice.fidelity;
-  run.seed = seed;
-  run.rolling_radius_m = Firmware::rolling_radius_m(loaded.config);
-  run.version = version();
-  run.config_sha256 = loaded.sha256;
-  run.config_toml = loaded.toml;
-  return run;
-}
-
-/// Everything of one tick but truth and timing.
-template <class Pipeline>
-void record_tick(std::int64_t tick, std::int64_t now_ns, const RawSample& raw, const Command& command,
-                 const typename Pipeline::Result& t, const Pipeline& pipeline,
-                 runtime::TickRecord* record) noexcept {
-  const auto& robot = pipeline.params().robot;
-  record->tick = tick;
-  record->now_ns = now_ns;
-  record->raw = raw;
-  record->velocity_W_m_s = {command.velocity_W_m_s.x(), command.velocity_W_m_s.y()};
-  record->yaw_rate_rad_s = command.yaw_rate_rad_s;
-  record->arm = command.arm;
-  record->heading_reset = command.heading_reset;
-  record->command_age_s = command.age_s;
-  record->inhibit = t.inhibit;
-  record->estimate = runtime::to_record(view(t.x_hat, robot));
-  record->reference = runtime::to_record(view(t.ref, robot));
-  using Estimators = std::decay_t<decltype(pipeline.estimators())>;
-  constexpr int kInputs = std::decay_t<decltype(t.u_lin)>::RowsAtCompileTime;
-  constexpr int kWheels = Pipeline::Wheels::RowsAtCompileTime;
-  static_assert(Estimators::kCount <= runtime::kMaxEstimators, "make room in TickRecord::others");
-  static_assert(kInputs > 0 && kInputs <= std::tuple_size_v<decltype(record->u_lin)>, "make room in u_lin");
-  static_assert(kWheels > 0 && kWheels <= kMaxMotors, "make room in rio_motors_t");
-  record->compared = 0;
-  for (std::size_t i = 0; i < Estimators::kCount && pipeline.params().estimators.compare; ++i) {
-    const auto id = static_cast<typename Estimators::Id>(i);
-    record->others[i] = runtime::to_record(view(pipeline.estimators().estimate(id), robot));
-    record->compared |= 1U << i;
-  }
-  record->motors = kWheels;
-  record->degraded = t.degraded;
-  for (int i = 0; i < kInputs; ++i) {
-    record->u_lin[static_cast<std::size_t>(i)] = t.u_lin(i);
-    record->u_friction[static_cast<std::size_t>(i)] = t.u_friction(i);
-  }
-  std::copy(std::begin(t.motors.duty), std::end(t.motors.duty), record->duty.begin());
-  record->enable = t.motors.enable;
-  record->saturated = t.saturated;
-  record->arm_state = static_cast<std::int32_t>(t.arm_state);
-  record->reasons = t.reasons;
-  record->battery_V = t.z.battery_V;
-}
+runtime::RunInfo run_info(const ConfiguredRobot& robot, const Choice& choice, std::int64_t seed);
 
 }  // namespace equipoise::app

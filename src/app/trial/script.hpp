@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "app/trial/firmware.hpp"
 #include "app/trial/path.hpp"
 #include "equipoise/samples.hpp"
 
@@ -42,20 +43,7 @@ struct Script {
 };
 
 /// `name`: of --path, or empty.
-template <class Firmware>
-Script script_for(const typename Firmware::Config& config, double drive_mps, double yaw_rate_rad_s,
-                  const std::string& name) {
-  constexpr double kPathSpeed_m_s = 0.1;
-  Script script;
-  script.drive_mps = drive_mps;
-  script.yaw_rate_rad_s = yaw_rate_rad_s;
-  script.along_nose = !Firmware::kDrivesSideways;
-  if (!name.empty()) {
-    PathLimits limits;
-    limits.acceleration_m_s2 = config.reference.max_acceleration_m_s2;
-    script.path = make_path(name, drive_mps != 0.0 ? drive_mps : kPathSpeed_m_s, limits);
-  }
-  return script;
-}
+Script script_for(const ConfiguredRobot& robot, double drive_mps, double yaw_rate_rad_s,
+                  const std::string& name);
 
 }  // namespace equipoise::app

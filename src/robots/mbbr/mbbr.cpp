@@ -18,4 +18,14 @@ Vec3 euler_rates(const Vec2& theta_xy, const Vec3& omega_B) noexcept {
   return {omega_B.x() + std::sin(theta_xy.y()) * z, cx * omega_B.y() - sx * omega_B.z(), z};
 }
 
+bool recall(const StateView& logged, MbbrEstimate* truth) noexcept {
+  truth->theta_xy = logged.theta_rad.head<2>();
+  truth->theta_z = logged.theta_rad.z();
+  truth->omega_B = logged.omega_B_rad_s;
+  truth->theta_dot = euler_rates(truth->theta_xy, truth->omega_B);
+  truth->phi_dot_star = logged.phi_dot_rad_s;
+  truth->phi = logged.phi_rad;
+  return true;
+}
+
 }  // namespace equipoise

@@ -147,11 +147,13 @@ inline StateView view(const MbbrEstimate& x, const MbbrParameters& p) noexcept {
   return v;
 }
 
+/// What the simulation knew, from the view that a log holds.
+bool recall(const StateView& logged, MbbrEstimate* truth) noexcept;
+
 /// Attitude: roll and pitch. Speed: inertial velocity of the ball, m/s, [T] section 6.4.
-inline StateErrors errors(const MbbrEstimate& x, const MbbrEstimate& truth,
-                          const MbbrParameters& p) noexcept {
-  const Vec2 v = rotate(x.theta_z, x.phi_dot_star) - rotate(truth.theta_z, truth.phi_dot_star);
-  return {(x.theta_xy - truth.theta_xy).squaredNorm(), p.r * p.r * v.squaredNorm(), 2};
+inline StateErrors errors(const StateView& x, const StateView& truth, const MbbrParameters& p) noexcept {
+  const Vec2 v = rotate(x.theta_rad.z(), x.phi_dot_rad_s) - rotate(truth.theta_rad.z(), truth.phi_dot_rad_s);
+  return {(x.theta_rad - truth.theta_rad).head<2>().squaredNorm(), p.r * p.r * v.squaredNorm(), 2};
 }
 
 }  // namespace equipoise

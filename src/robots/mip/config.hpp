@@ -20,6 +20,9 @@ namespace equipoise {
 
 using MipSlcPipeline = Pipeline<Mip, MipEstimators, MipReferenceStage, MipSlcFeedback>;
 using MipLqrPipeline = Pipeline<Mip, MipEstimators, MipReferenceStage, MipLqrFeedback>;
+// Compiled in pipeline.cpp.
+extern template class Pipeline<Mip, MipEstimators, MipReferenceStage, MipSlcFeedback>;
+extern template class Pipeline<Mip, MipEstimators, MipReferenceStage, MipLqrFeedback>;
 
 struct MipConfig {
   MipParameters robot;

@@ -107,10 +107,13 @@ inline StateView view(const MipEstimate& x, const MipParameters&) noexcept {
   return v;
 }
 
+/// A log does not hold all that the simulation knew.
+inline bool recall(const StateView&, MipEstimate*) noexcept { return false; }
+
 /// Attitude: lean. Speed: mean encoder rate, rad/s.
-inline StateErrors errors(const MipEstimate& x, const MipEstimate& truth, const MipParameters&) noexcept {
-  const double lean = x.theta - truth.theta;
-  const double speed = x.phi_dot - truth.phi_dot;
+inline StateErrors errors(const StateView& x, const StateView& truth, const MipParameters&) noexcept {
+  const double lean = x.theta_rad.x() - truth.theta_rad.x();
+  const double speed = x.phi_dot_rad_s.x() - truth.phi_dot_rad_s.x();
   return {lean * lean, speed * speed, 1};
 }
 

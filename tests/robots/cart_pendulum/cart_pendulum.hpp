@@ -63,10 +63,12 @@ inline StateView view(const CartPendulumEstimate& x, const CartPendulumParameter
   return cart_pendulum_view(x, p.wheel_radius_m);
 }
 
-inline StateErrors errors(const CartPendulumEstimate& x, const CartPendulumEstimate& truth,
+inline bool recall(const StateView&, CartPendulumEstimate*) noexcept { return false; }
+
+inline StateErrors errors(const StateView& x, const StateView& truth,
                           const CartPendulumParameters&) noexcept {
-  const double lean = x.lean - truth.lean;
-  const double rate = x.wheel_rate - truth.wheel_rate;
+  const double lean = x.theta_rad.y() - truth.theta_rad.y();
+  const double rate = x.phi_dot_rad_s.x() - truth.phi_dot_rad_s.x();
   return {lean * lean, rate * rate, 1};
 }
 

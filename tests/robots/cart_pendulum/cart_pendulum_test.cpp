@@ -4,26 +4,29 @@
 
 #include <filesystem>
 
-#include "app/log/replay_as.hpp"
-#include "app/sim/simulated_run.hpp"
+#include "app/log/replay.hpp"
+#include "app/sim/simulate.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 #include "robots/cart_pendulum/firmware.hpp"
 
 namespace equipoise {
 namespace {
 
+std::unique_ptr<const app::ConfiguredRobot> robot(const std::vector<std::string>& set = {}) {
+  return type_of<CartPendulumFirmware>().load(config_file<CartPendulumFirmware>(), set);
+}
+
 app::Choice choice() {
   app::Choice choice;
   choice.fidelity = "nominal";
-  app::complete<CartPendulumFirmware>(choice);
+  app::complete(type_of<CartPendulumFirmware>(), &choice);
   return choice;
 }
 
 app::SimSummary simulate(const app::SimOptions& options, const app::TickObserver& observe,
                          const std::vector<std::string>& set = {}) {
   const std::atomic<bool> never{false};
-  const auto config = CartPendulumFirmware::load(config_file<CartPendulumFirmware>(), set).config;
-  return app::simulate<CartPendulumFirmware>(config, choice(), options, observe, never);
+  return app::simulate(*robot(set), choice(), options, observe, never);
 }
 
 TEST(CartPendulum, BalancesAndDrives) {
@@ -46,18 +49,17 @@ TEST(CartPendulum, FallsWithoutItsFeedback) {
 
 TEST(CartPendulum, ItsLogReplaysBitForBit) {
   const std::string path = testing::TempDir() + "cart-pendulum-" + std::to_string(::getpid()) + ".lcm";
-  const auto loaded = CartPendulumFirmware::load(config_file<CartPendulumFirmware>(), {});
   runtime::TelemetryOptions options;
   options.log_path = path;
   options.wait_when_full = true;
-  options.run = app::run_info<CartPendulumFirmware>(loaded, choice(), 1);
+  options.run = app::run_info(*robot(), choice(), 1);
   options.run.backend = "sim";
   {
     runtime::Telemetry telemetry(options);
     (void)simulate({{true, 0.1}, 10.0, 1}, [&](const runtime::TickRecord& r) { telemetry.hand_over(r); });
   }
   app::RunLog log(path);
-  const app::Replay replay = app::replay_as<CartPendulumFirmware>(log, path);
+  const app::Replay replay = app::replay_as(type_of<CartPendulumFirmware>(), log, path);
   EXPECT_EQ(replay.ticks, 2000);
   EXPECT_TRUE(replay.identical()) << "tick " << replay.difference.tick << " " << replay.difference.field;
   std::filesystem::remove(path);

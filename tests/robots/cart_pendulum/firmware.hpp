@@ -2,7 +2,7 @@
 // Tests only.
 #pragma once
 
-#include "app/trial/firmware.hpp"
+#include "app/trial/firmware_of.hpp"
 #include "config/common_config.hpp"
 #include "robots/cart_pendulum/world.hpp"
 #include "support/trial.hpp"
@@ -29,6 +29,11 @@ struct CartPendulumFirmware {
   static constexpr const char* kName = "cart_pendulum";
   static constexpr const char* kDefaultEstimator = "complementary";
   static constexpr const char* kDefaultController = "lqr";
+  static constexpr const char* kSpeedRmseKey = "wheel_speed_rmse_rad_s";
+  static constexpr const char* kSpeedLabel = "wheel speed RMSE";
+  static constexpr const char* kSpeedUnit = "rad/s";
+  static constexpr double kSpeedScale = 1.0;
+  static constexpr bool kDrivesSideways = false;
   static constexpr double kForward_rad = 0.0;
 
   static Loaded load(const std::string& path, const Overrides& overrides) {
@@ -107,6 +112,11 @@ struct CartPendulumFirmware {
 template <>
 inline std::string config_file<CartPendulumFirmware>() {
   return std::string(EQUIPOISE_SOURCE_DIR) + "/tests/robots/cart_pendulum/cart_pendulum.toml";
+}
+
+template <>
+inline const app::RobotType& type_of<CartPendulumFirmware>() {
+  return app::type_as<CartPendulumFirmware>();
 }
 
 }  // namespace equipoise

@@ -171,8 +171,7 @@ ROOMS: dict[str, Room] = {
         ),
     ),
     "replay": Room(
-        ("src/app/log/replay.cpp", "src/app/log/replay_as.hpp"),
-        # Tests have the header's templates in themselves: replay.cpp is not compiled anew with it.
+        ("src/app/log/replay.cpp",),
         tuple(
             Stage("tests/replay_tests", (f"replay/{test}_test.cpp",))
             for test in ("replay_parts", "replay_result", "fault_replay")

@@ -1,13 +1,11 @@
-// A pipeline with another tuning beside the one that a log replays: same samples, same commands. Its
-// estimators take the inputs that the recorded run applied, so their estimates can be compared; what it would
-// have done to the motors goes nowhere. In: both pipelines tick by tick -> out: Retuned.
+// What the estimators of one pipeline are given, for those of another that runs beside it with another
+// tuning. In: a pipeline -> out: the same with estimators whose inputs can be seen and replaced. Replay only.
 #pragma once
 
-#include <cmath>
+#include <algorithm>
 #include <functional>
 #include <vector>
 
-#include "app/log/replay.hpp"
 #include "equipoise/pipeline.hpp"
 
 namespace equipoise::app {
@@ -74,29 +72,5 @@ class GivenInputs {
   std::vector<Given> given_;
   std::size_t taken_ = 0;
 };
-
-/// One tick of both into the comparison.
-inline void compare_tunings(const runtime::TickRecord& recorded, const runtime::TickRecord& retuned,
-                            Retuned* out) {
-  constexpr auto armed = static_cast<std::int32_t>(ArmState::kArmed);
-  if (recorded.arm_state != armed) return;
-  out->difference.add(retuned.estimate, recorded.estimate);
-  const auto mean_square = [](const runtime::TickRecord& r) {
-    double sum = 0.0;
-    for (int i = 0; i < r.motors; ++i) sum += std::pow(r.duty[static_cast<std::size_t>(i)], 2) / r.motors;
-    return sum;
-  };
-  const auto add = [&](const runtime::TickRecord& r, Retuned::Figures* figures) {
-    if (recorded.has_truth) figures->errors.add(r.estimate, recorded.truth);
-    figures->duty_squared += mean_square(r);
-    figures->innovation += r.estimate.normalized_innovation;
-    if (r.saturated) ++figures->saturated;
-  };
-  add(recorded, &out->recorded);
-  add(retuned, &out->changed);
-  if (retuned.arm_state == armed) return;
-  ++out->not_armed;
-  out->reasons |= retuned.reasons;
-}
 
 }  // namespace equipoise::app

@@ -1,8 +1,0 @@
-#include "app/sim/simulated_run.hpp"
-
-namespace equipoise::app {
-
-template SimSummary simulate<MipFirmware>(const MipConfig&, const Choice&, const SimOptions&,
-                                          const TickObserver&, const std::atomic<bool>&);
-
-}  // namespace equipoise::app
