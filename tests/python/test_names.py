@@ -1,6 +1,7 @@
 """The words for the firmware's numbers follow the C++ and C headers, where these exist."""
 
 import re
+from dataclasses import replace
 
 import pytest
 from equipoise_tools import names
@@ -18,13 +19,35 @@ def enumerators(text: str, enum: str) -> list[tuple[str, int]]:
     ("header", "enum", "words"),
     [
         ("include/equipoise/actuate/safety.hpp", "ArmState", names.ARM_STATES),
-        ("include/equipoise/actuate/safety_reasons.hpp", "SafetyReason", names.SAFETY_REASONS),
         ("include/equipoise/sample.h", "rio_health", names.SENSOR_HEALTH),
-        ("include/equipoise/actuate/degraded.hpp", "DegradedBit", names.DEGRADED),
     ],
 )
 def test_words_follow_the_headers(root, header, enum, words):
     assert enumerators((root / header).read_text(), enum) == [(word, i) for i, word in enumerate(words)]
+
+
+@pytest.mark.parametrize(
+    ("header", "enum", "table"),
+    [
+        ("include/equipoise/actuate/safety_reasons.hpp", "SafetyReason", names.SAFETY_TABLE),
+        ("include/equipoise/actuate/degraded.hpp", "DegradedBit", names.DEGRADED_TABLE),
+    ],
+)
+def test_the_table_of_reasons_has_a_row_with_a_remedy_for_each_bit(root, header, enum, table):
+    members = enumerators((root / header).read_text(), enum)
+    spelled = dict(
+        zip(("wheel 1", "wheel 2", "wheel 3", "wheel 4"), ("one", "two", "three", "four"), strict=True)
+    )
+    for wheel, number in spelled.items():
+        table = [replace(row, name=row.word.replace(wheel, f"wheel {number}")) for row in table]
+    assert members == [(row.word, i) for i, row in enumerate(table)]
+    assert all(len(row.text) > 8 and len(row.remedy) > 8 for row in table)
+
+
+def test_the_troubleshooting_page_has_the_table_of_reasons(root):
+    page = (root / "docs" / "troubleshooting.md").read_text()
+    for row in (*names.SAFETY_TABLE, *names.DEGRADED_TABLE):
+        assert f"| `{row.name}` | {row.text} | {row.remedy} |" in page, row.name
 
 
 def test_bits_without_a_word_are_named_by_number():

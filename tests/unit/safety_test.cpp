@@ -309,14 +309,5 @@ TEST(Safety, AnOldCommandAsksForAStop) {
   EXPECT_EQ(obeyed.yaw_rate_rad_s, 0.0);
 }
 
-TEST(SafetyReasons, EveryBitHasANameOfItsOwn) {
-  std::set<std::string> names;
-  for_each_reason(~0U, [&](const char* name) { names.insert(name); });
-  EXPECT_EQ(names.size(), kSafetyReasonNames.size());
-  EXPECT_EQ(kMotorFault, 1U << (kSafetyReasonNames.size() - 1));
-  EXPECT_EQ(kSafetyReasonNames[13], std::string("guard_dead"));
-  EXPECT_EQ(kSafetyReasonNames[18], std::string("wheel_slip"));
-}
-
 }  // namespace
 }  // namespace equipoise

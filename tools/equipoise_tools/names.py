@@ -1,4 +1,8 @@
-"""Channels, and the words for what the firmware sends as numbers (a test holds them to the C++ headers)."""
+"""Channels, and the words for what the firmware sends as numbers."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
 
 from equipoise_robot.channels import (
     COMMAND,
@@ -31,39 +35,6 @@ __all__ = [
 ENDED = ("finished", "fell", "disarmed", "interrupted", "device")
 
 ARM_STATES = ("disarmed", "armed", "fault")
-# Bit by bit, enum SafetyReason.
-SAFETY_REASONS = (
-    "not requested",
-    "tilt",
-    "imu stale",
-    "encoder stale",
-    "not finite",
-    "battery low",
-    "attitude stale",
-    "gyro moving",
-    "not calibrated",
-    "encoder sign",
-    "estimator unhealthy",
-    "command stale",
-    "realtime missing",
-    "guard dead",
-    "overrun",
-    "picked up",
-    "stall",
-    "saturated",
-    "wheel slip",
-    "encoder jump",
-    "bridge fault",
-    "write failed",
-    "log failed",
-    "encoder stuck",
-    "wheel one",
-    "wheel two",
-    "wheel three",
-    "wheel four",
-    "imu untrusted",
-    "motor fault",
-)
 # Bit by bit, enum rio_health.
 SENSOR_HEALTH = (
     "imu clipped",
@@ -76,18 +47,40 @@ SENSOR_HEALTH = (
     "bridge fault",
     "battery error",
 )
-# Bit by bit, enum DegradedBit.
-DEGRADED = (
-    "without imu",
-    "without encoders",
-    "estimator in doubt",
-    "without wheel one",
-    "without wheel two",
-    "without wheel three",
-    "without wheel four",
-    "without gyro axis",
-    "gyro bias jumped",
+_TABLE = Path(__file__).resolve().parents[2] / "src" / "app" / "text" / "reasons.cpp"
+_ROW = re.compile(
+    r'\{\s*k\w+,\s*"(?P<name>\w+)",\s*(?P<text>(?:"[^"]*"\s*)+),\s*(?P<remedy>(?:"[^"]*"\s*)+)[,}]'
 )
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A row of the firmware's table: why the motors are off, or what the robot does without."""
+
+    name: str
+    text: str
+    remedy: str
+
+    @property
+    def word(self) -> str:
+        return self.name.replace("_", " ")
+
+
+def _rows(function: str) -> tuple[Reason, ...]:
+    """Bit by bit."""
+    body = _TABLE.read_text().split(f"& {function}() {{", 1)[1].split("return rows;", 1)[0]
+    return tuple(
+        Reason(
+            match["name"], *("".join(re.findall(r'"([^"]*)"', match[part])) for part in ("text", "remedy"))
+        )
+        for match in _ROW.finditer(body)
+    )
+
+
+SAFETY_TABLE = _rows("safety_reasons")
+DEGRADED_TABLE = _rows("degraded_modes")
+SAFETY_REASONS = tuple(reason.word for reason in SAFETY_TABLE)
+DEGRADED = tuple(mode.word for mode in DEGRADED_TABLE)
 
 
 def bits(value: int, words: tuple[str, ...]) -> list[str]:

@@ -1,5 +1,5 @@
-// What a robot does without while it runs on: one bit, one stable name and one speed limit per mode, for
-// telemetry, CLI and the setpoint. In: bits -> out: names, a command within the limits. RT-safe.
+// What a robot does without while it runs on: one bit and one speed limit per mode. Their names, meanings
+// and remedies: src/app/text/reasons.cpp. In: bits, a command -> out: the command within the limits. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -31,26 +31,25 @@ inline constexpr std::uint32_t kSensorsLeftOut =
 inline constexpr std::uint32_t kSensorsJudged = kSensorsLeftOut | kGyroBiasJumped;
 
 struct DegradedMode {
-  const char* name;
   double max_speed_m_s;
   double max_yaw_rate_rad_s;
 };
 
 inline constexpr double kUnlimited = 1e9;
 
-/// A gap is over before a slower setpoint would help, and braking into it topples (8 of 50 at 1 Hz, 100 ms);
-/// who doubts his estimate stands; one encoder less leaves no second opinion on slip, so the robot goes no
-/// faster than it was tried; so does one whose gyro may jump again.
+/// In the order of the bits. A gap is over before a slower setpoint would help, and braking into it topples
+/// (8 of 50 at 1 Hz, 100 ms); who doubts his estimate stands; one encoder less leaves no second opinion on
+/// slip, so the robot goes no faster than it was tried; so does one whose gyro may jump again.
 inline constexpr std::array<DegradedMode, 9> kDegradedModes{{
-    {"without_imu", kUnlimited, kUnlimited},
-    {"without_encoders", kUnlimited, kUnlimited},
-    {"estimator_in_doubt", 0.0, 0.0},
-    {"without_wheel_1", 0.1, 2.0 * kPi},
-    {"without_wheel_2", 0.1, 2.0 * kPi},
-    {"without_wheel_3", 0.1, 2.0 * kPi},
-    {"without_wheel_4", 0.1, 2.0 * kPi},
-    {"without_gyro_axis", 0.0, 0.0},
-    {"gyro_bias_jumped", 0.1, 2.0 * kPi},
+    {kUnlimited, kUnlimited},
+    {kUnlimited, kUnlimited},
+    {0.0, 0.0},
+    {0.1, 2.0 * kPi},
+    {0.1, 2.0 * kPi},
+    {0.1, 2.0 * kPi},
+    {0.1, 2.0 * kPi},
+    {0.0, 0.0},
+    {0.1, 2.0 * kPi},
 }};
 
 /// Calls `with(mode)` for every bit that is set.

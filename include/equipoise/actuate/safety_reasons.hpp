@@ -1,8 +1,7 @@
-// Why the motors are off: one bit per reason, one stable name per bit, for telemetry, CLI, LED and CAN.
-// In: bits -> out: names. RT-safe.
+// Why the motors are off: one bit per reason, for telemetry, CLI, LED and CAN. Their names, meanings and
+// remedies: src/app/text/reasons.cpp.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 namespace equipoise {
@@ -39,44 +38,5 @@ enum SafetyReason : std::uint32_t {
   kImuUntrusted = 1u << 28,  // an axis lies, or stands still
   kMotorFault = 1u << 29,    // motors do not do as told
 };
-
-inline constexpr std::array<const char*, 30> kSafetyReasonNames{"not_requested",
-                                                                "tilt",
-                                                                "imu_stale",
-                                                                "encoder_stale",
-                                                                "not_finite",
-                                                                "battery_low",
-                                                                "attitude_stale",
-                                                                "gyro_moving",
-                                                                "not_calibrated",
-                                                                "encoder_sign",
-                                                                "estimator_unhealthy",
-                                                                "command_stale",
-                                                                "realtime_missing",
-                                                                "guard_dead",
-                                                                "overrun",
-                                                                "picked_up",
-                                                                "stall",
-                                                                "saturated",
-                                                                "wheel_slip",
-                                                                "encoder_jump",
-                                                                "bridge_fault",
-                                                                "write_failed",
-                                                                "log_failed",
-                                                                "encoder_stuck",
-                                                                "wheel_1",
-                                                                "wheel_2",
-                                                                "wheel_3",
-                                                                "wheel_4",
-                                                                "imu_untrusted",
-                                                                "motor_fault"};
-
-/// Calls `with(name)` for every bit that is set.
-template <class With>
-void for_each_reason(std::uint32_t reasons, With&& with) {
-  for (std::size_t i = 0; i < kSafetyReasonNames.size(); ++i) {
-    if ((reasons & (1u << i)) != 0) with(kSafetyReasonNames[i]);
-  }
-}
 
 }  // namespace equipoise

@@ -145,7 +145,9 @@ Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other,
   };
   out.ticks = runtime::run_loop(io, firmware, commands_for(firmware), on_tick, never, supervisor).ticks;
   io.rethrow();
-  out.verdict = log.end() ? Verdict::of(*log.end()) : judge.verdict(false, false);
+  const Verdict by_its_ticks = judge.verdict(false, false);
+  out.verdict = log.end() ? Verdict::of(*log.end()) : by_its_ticks;
+  out.verdict.numbers = by_its_ticks.numbers;
   out.incomplete = log.incomplete_ticks();
   out.damaged_bytes = log.damaged_bytes();
   if (follower != nullptr) out.retuned = retuned;
@@ -229,8 +231,12 @@ void compare_tunings(const runtime::TickRecord& recorded, const runtime::TickRec
 VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept {
   const double tilt_rad = r.has_truth ? std::hypot(r.truth.theta_rad[0], r.truth.theta_rad[1]) : std::nan("");
   const double simulated_s = 1e-9 * static_cast<double>(r.now_ns);
-  return {r.has_truth ? simulated_s : static_cast<double>(r.tick) * kTickS, r.arm,
-          r.arm_state == static_cast<std::int32_t>(ArmState::kArmed), r.reasons, tilt_rad};
+  return {r.has_truth ? simulated_s : static_cast<double>(r.tick) * kTickS,
+          r.arm,
+          r.arm_state == static_cast<std::int32_t>(ArmState::kArmed),
+          r.reasons,
+          tilt_rad,
+          reason_numbers(r)};
 }
 
 bool settled(const runtime::TickRecord& r) noexcept {
@@ -258,6 +264,7 @@ Replay replay_as(const RobotType& robot, RunLog& log, const std::string& origin,
     const Retuning both = recorded->retuning(choice, *changed, asked);
     r = replay(log, *both.recorded, std::nullopt, both.changed.get());
   }
+  r.safety = recorded->safety;
   if (r.ticks == 0) throw InputError(origin + ": holds no whole tick");
   return r;
 }

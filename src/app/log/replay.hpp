@@ -60,6 +60,7 @@ struct Replay {
   std::size_t damaged_bytes = 0;
   std::int64_t missing = 0;  // ticks that the log lost
   Verdict verdict;           // the run's own; of a log that was cut off, what its ticks say
+  SafetyParams safety;       // as the run was configured
   Difference difference;
   ReplayErrors logged, other;
   std::optional<Retuned> retuned;

@@ -109,6 +109,7 @@ void print(std::FILE* out, const ReplayArguments& a, const runtime::RunInfo& run
     std::fprintf(out, "  estimate, control and duty are the same, bit for bit\n");
   }
   std::fprintf(out, "  %s\n", r.verdict.sentence().c_str());
+  print_reasons(out, r.verdict, r.safety);
   if (r.retuned) {
     print(out, a.beside, run, *r.retuned);
     return;

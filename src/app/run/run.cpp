@@ -63,7 +63,7 @@ int run_lockstep(const RunArguments& a, const RobotType& robot) {
     if (engine.end() != LockstepEnd::kPeerGone || interrupted.load()) break;
     std::fprintf(stderr, "equipoise: %s; motors are off, waiting for another\n", last.error.c_str());
   }
-  return report(a, robot.name, last, trials, runner.robot().sha256, nullptr);
+  return report(a, runner.robot(), last, trials, nullptr);
 }
 
 /// What `sim` simulates, behind what the board runs.
@@ -84,7 +84,7 @@ int run_simulated(const RunArguments& a, const RobotType& robot) {
         const std::atomic<bool>& failed = practice.breaks_log() ? practice.log_failed() : log_failed;
         return supervisor.emplace(runtime::Watched{nullptr, 0, &failed, true});  // simulated time
       });
-  return report(a, robot.name, outcome, 1, runner.robot().sha256, nullptr);
+  return report(a, runner.robot(), outcome, 1, nullptr);
 }
 
 int run_board(const RunArguments& a, const RobotType& robot, const Board& board,
@@ -113,7 +113,7 @@ int run_board(const RunArguments& a, const RobotType& robot, const Board& board,
   session.end();
   if (outcome.end == "device")
     outcome.error = std::string("the board's tick failed: ") + std::strerror(-outcome.trial.error);
-  return report(a, robot.name, outcome, 1, runner.robot().sha256, session.summary());
+  return report(a, runner.robot(), outcome, 1, session.summary());
 }
 
 int run(RunArguments a) {

@@ -4,8 +4,8 @@
 
 #include "app/run/realtime_session.hpp"
 #include "app/run/trial.hpp"
+#include "app/trial/firmware.hpp"
 #include "equipoise/runtime/telemetry.hpp"
-#include "robots/choice.hpp"
 
 namespace equipoise::app {
 
@@ -46,7 +46,7 @@ struct Outcome {
 };
 
 /// Writes text and JSON; the exit status. `session`: guard, realtime, timing; null: an engine's time.
-int report(const RunArguments& a, const std::string& robot, Outcome outcome, int trials,
-           const std::string& config_sha256, const nlohmann::json& session);
+int report(const RunArguments& a, const ConfiguredRobot& robot, Outcome outcome, int trials,
+           const nlohmann::json& session);
 
 }  // namespace equipoise::app

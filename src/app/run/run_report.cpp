@@ -10,11 +10,11 @@ namespace {
 
 constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();  // null in JSON
 
-nlohmann::json to_json(const RunArguments& a, const std::string& robot, const Outcome& o, int trials,
-                       const std::string& sha256, const nlohmann::json& session) {
+nlohmann::json to_json(const RunArguments& a, const ConfiguredRobot& robot, const Outcome& o, int trials,
+                       const nlohmann::json& session) {
   const Trial& t = o.trial;
   nlohmann::json out{
-      {"robot", robot},
+      {"robot", robot.type->name},
       {"backend", a.backend},
       {"estimator", a.choice.estimator},
       {"controller", a.choice.controller},
@@ -29,7 +29,7 @@ nlohmann::json to_json(const RunArguments& a, const std::string& robot, const Ou
       {"end", o.end},
       {"error", o.error.empty() ? nlohmann::json(nullptr) : nlohmann::json(o.error)},
       {"log", o.log},
-      {"config_sha256", sha256},
+      {"config_sha256", robot.sha256},
       {"version", version()}};
   t.verdict.write(&out);
   if (!session.is_null()) out.update(session);
@@ -38,8 +38,8 @@ nlohmann::json to_json(const RunArguments& a, const std::string& robot, const Ou
 
 }  // namespace
 
-int report(const RunArguments& a, const std::string& robot, Outcome o, int trials,
-           const std::string& config_sha256, const nlohmann::json& session) {
+int report(const RunArguments& a, const ConfiguredRobot& robot, Outcome o, int trials,
+           const nlohmann::json& session) {
   const Trial& t = o.trial;
   if (o.error.empty() && t.verdict.fell() && t.armed)
     o.error = "the motors went off at " + std::to_string(t.verdict.fell_at_s) +
@@ -49,8 +49,9 @@ int report(const RunArguments& a, const std::string& robot, Outcome o, int trial
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   std::fprintf(out, "%s  (%s, %s, %s)\n", t.verdict.sentence().c_str(), a.backend.c_str(),
                a.choice.estimator.c_str(), a.choice.controller.c_str());
+  print_reasons(out, t.verdict, robot.safety);
   std::fprintf(out, "  duty max        %8.3f\n  log             %s\n", t.duty_max, o.log.c_str());
-  if (!a.json.empty()) write_json(to_json(a, robot, o, trials, config_sha256, session), a.json);
+  if (!a.json.empty()) write_json(to_json(a, robot, o, trials, session), a.json);
   if (o.error.empty()) return 0;
   std::fprintf(stderr, "equipoise: %s; motors are off\n", o.error.c_str());
   return 1;

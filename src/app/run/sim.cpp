@@ -29,10 +29,13 @@ std::string shown(const char* format, double value) {
   return std::isnan(value) ? "       -" : text;
 }
 
-void print_summary(std::FILE* out, const RobotType& robot, const SimRequest& r, const SimSummary& s) {
+void print_summary(std::FILE* out, const ConfiguredRobot& configured, const SimRequest& r,
+                   const SimSummary& s) {
+  const RobotType& robot = *configured.type;
   std::fprintf(out, "%s  (%s, %s, %s, %s, seed %llu)\n", s.verdict.sentence().c_str(), robot.name,
                r.choice.estimator.c_str(), r.choice.controller.c_str(), r.choice.fidelity.c_str(),
                static_cast<unsigned long long>(r.seed));
+  print_reasons(out, s.verdict, configured.safety);
   const auto line = [out](const char* label, const std::string& value, const char* unit) {
     std::fprintf(out, "  %-15s %s %s\n", label, value.c_str(), unit);
   };
@@ -115,7 +118,7 @@ int run_sim(Arguments a) {
   const runtime::TelemetryReport report = telemetry.finish(summary.verdict.record());
   if (!report.warning.empty()) std::fprintf(stderr, "equipoise: warning: %s\n", report.warning.c_str());
 
-  print_summary(out, *robot->type, request, summary);
+  print_summary(out, *robot, request, summary);
   std::fprintf(out, "  log             %s\n", a.log.c_str());
   if (!a.json.empty()) {
     nlohmann::json json = app::to_json(request, summary, *robot);

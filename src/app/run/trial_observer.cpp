@@ -11,7 +11,7 @@ namespace equipoise::app {
 void TrialObserver::operator()(std::int64_t tick, const runtime::TickRecord& t) noexcept {
   const auto arm_state = static_cast<ArmState>(t.arm_state);
   judge_.observe({static_cast<double>(tick) * kTickS, t.arm, arm_state == ArmState::kArmed, t.reasons,
-                  std::numeric_limits<double>::quiet_NaN()});
+                  std::numeric_limits<double>::quiet_NaN(), reason_numbers(t)});
   measure(t);
   record(tick, t);
   if (indicator_ != nullptr) indicator_->tell(arm_state, t.reasons, t.battery_V);

@@ -4,7 +4,6 @@
 #include <cstdio>
 
 #include "app/text/json.hpp"
-#include "app/text/reasons.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -30,6 +29,8 @@ void VerdictJudge::observe(const Tick& tick) noexcept {
   if (lost_) return;
   verdict_.reasons = tick.reasons;
   armed_ = armed_ || tick.driven;
+  verdict_.numbers = tick.numbers;
+  verdict_.numbers.was_armed = armed_;
   if (!tick.asked) asked_from_s_ = -1.0;
   if (tick.asked && asked_from_s_ < 0.0) asked_from_s_ = tick.t_s;
   const bool off = tick.asked && !tick.driven;
@@ -81,6 +82,12 @@ void Verdict::write(nlohmann::json* out) const {
   (*out)["reasons"] = reason_names(reasons);
   (*out)["fell"] = fell();
   (*out)["fell_at_s"] = fell() ? nlohmann::json(fell_at_s) : nlohmann::json(nullptr);
+}
+
+void print_reasons(std::FILE* out, const Verdict& verdict, const SafetyParams& limits) {
+  if (!verdict.fell()) return;
+  for (const std::string& line : reasons_explained(verdict.reasons, verdict.numbers, limits))
+    std::fprintf(out, "  %s\n", line.c_str());
 }
 
 runtime::EndRecord Verdict::record() const noexcept {

@@ -5,9 +5,11 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdio>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "app/text/reasons.hpp"
 #include "equipoise/runtime/record.hpp"
 
 namespace equipoise::app {
@@ -21,6 +23,7 @@ struct Verdict {
   std::uint32_t reasons = 0;  // SafetyReason bits: when the motors went off, else at the end
   double fell_at_s = 0.0;     // when it fell or was disarmed
   double duration_s = 0.0;
+  ReasonNumbers numbers{};  // of the tick that `reasons` are of, where a tick was at hand
 
   bool fell() const noexcept { return ended == Ended::kFell || ended == Ended::kDisarmed; }
   const char* name() const noexcept {
@@ -37,6 +40,9 @@ struct Verdict {
   static Verdict of(const runtime::EndRecord& record) noexcept;
 };
 
+/// A line for each reason of a run that did not end as asked.
+void print_reasons(std::FILE* out, const Verdict& verdict, const SafetyParams& limits);
+
 class VerdictJudge {
  public:
   /// A robot that has leaned further has fallen over.
@@ -48,6 +54,7 @@ class VerdictJudge {
     bool driven;
     std::uint32_t reasons;
     double true_tilt_rad;  // NaN where nobody knows
+    ReasonNumbers numbers{};
   };
   void observe(const Tick& tick) noexcept;
 
