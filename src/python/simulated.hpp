@@ -2,10 +2,10 @@
 // estimate from the robot-neutral state -> out: SimulatedOf. Included by robot_*.cpp only.
 #pragma once
 
-#include "app/sim/hooks.hpp"
 #include "app/sim/simulated_run.hpp"
 #include "app/trial/firmware_of.hpp"
 #include "equipoise/sense/calibrate.hpp"
+#include "python/hooks.hpp"
 #include "python/simulation.hpp"
 #include "robots/lanes/roll.hpp"
 

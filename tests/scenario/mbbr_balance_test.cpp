@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "app/sim/simulate.hpp"
+#include "robots/robot_list.hpp"
 
 namespace equipoise {
 namespace {

@@ -4,6 +4,7 @@
 #include "app/sim/simulate.hpp"
 #include "config/population.hpp"
 #include "equipoise/actuate/degraded.hpp"
+#include "robots/robot_list.hpp"
 
 namespace equipoise {
 namespace {
