@@ -66,12 +66,14 @@ TEST(Board, MipHasTwoDriveBrakeBridgesOneReversed) {
   ASSERT_EQ(board.wiring.motors, 2u);
   EXPECT_EQ(board.wiring.motor[0].bridge, BBB_TB6612);
   EXPECT_FALSE(board.wiring.motor[0].fault.used);
-  // librobotcontrol: polarity {1, -1, -1, 1} of motors 1 to 4; rc_balance: left +1, right -1, motors and
-  // encoders.
-  EXPECT_TRUE(board.wiring.motor[0].motor_reversed);
-  EXPECT_FALSE(board.wiring.motor[0].encoder_reversed);
-  EXPECT_FALSE(board.wiring.motor[1].motor_reversed);
-  EXPECT_TRUE(board.wiring.motor[1].encoder_reversed);
+  // librobotcontrol: polarity {1, -1, -1, 1} of motors 1 to 4; rc_balance: right wheel motor 2, encoder 2,
+  // sign -1; left wheel motor 3, encoder 3, sign +1.
+  EXPECT_STREQ(board.wiring.motor[0].encoder, "48302180");
+  EXPECT_FALSE(board.wiring.motor[0].motor_reversed);
+  EXPECT_TRUE(board.wiring.motor[0].encoder_reversed);
+  EXPECT_STREQ(board.wiring.motor[1].encoder, "48304180");
+  EXPECT_TRUE(board.wiring.motor[1].motor_reversed);
+  EXPECT_FALSE(board.wiring.motor[1].encoder_reversed);
 }
 
 TEST(Board, TheBlueIsTheSameRobotOnOtherPins) {
@@ -86,8 +88,8 @@ TEST(Board, TheBlueIsTheSameRobotOnOtherPins) {
     EXPECT_STREQ(blue.wiring.motor[i].encoder, cape.wiring.motor[i].encoder);
   }
   // BeagleBoard.org's am335x-boneblue.dts: MDIR_2B is gpio0.10, the battery's second LED gpio0.11.
-  EXPECT_STREQ(blue.wiring.motor[1].in2.chip, "44e07000");
-  EXPECT_EQ(blue.wiring.motor[1].in2.line, 10u);
+  EXPECT_STREQ(blue.wiring.motor[0].in2.chip, "44e07000");
+  EXPECT_EQ(blue.wiring.motor[0].in2.line, 10u);
   EXPECT_EQ(blue.led_bars[1].line, 11);
 }
 

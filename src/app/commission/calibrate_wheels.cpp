@@ -191,6 +191,11 @@ bool WheelLayout::told_apart_by_gyro() const {
   return true;
 }
 
+std::string WheelLayout::name(int wheel) const {
+  const char* const where = place[static_cast<std::size_t>(wheel)];
+  return format("wheel %d", wheel + 1) + (where == nullptr ? "" : format(" (%s)", where));
+}
+
 WheelLayout layout_of(const MbbrParameters& robot, const MotorParameters& motor,
                       const Calibration& calibration) {
   WheelLayout layout;
@@ -209,6 +214,7 @@ WheelLayout layout_of(const MipParameters& robot, const MotorParameters& motor,
   WheelLayout layout;
   layout.wheels = Mip::kWheels;
   layout.axis_B.fill(Vec3::UnitX());  // x points along the axle; turning about +x rolls the robot forwards
+  layout.place = {"right", "left"};
   layout.body_inertia_kg_m2 = {robot.I_b1, robot.I_b2, robot.I_b3};
   layout.motor = motor;
   layout.counts_per_rev = calibration.encoder_counts_per_rev;
@@ -230,7 +236,7 @@ void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFin
   for (WheelFinding& f : *findings) {
     if (f.wheel && f.turns_backwards) continue;
     std::string question = format("motor %d moved encoder %d", f.motor + 1, f.encoder + 1);
-    question += f.wheel ? "" : format("; which wheel turned (1 to %d)", layout.wheels);
+    question += f.wheel ? "" : "; which turned, " + layout.name(0) + " to " + layout.name(layout.wheels - 1);
     question += f.turns_backwards ? ", first forwards or backwards (already felt; f)"
                                   : ", and which way first: forwards or backwards (f, b)";
     const std::string answer = manual.ask(
@@ -279,7 +285,7 @@ std::string complaint(const std::vector<WheelFinding>& findings) {
 EncoderFinding turn_by_hand(ManualDrive& manual, const WheelLayout& layout, int wheel, int turns) {
   const RawSample start = manual.sample();
   manual.ask({Request::kTurnWheel,
-              format("turn wheel %d forwards by %d whole turns, then press Enter", wheel + 1, turns), wheel,
+              "turn " + layout.name(wheel) + format(" forwards by %d whole turns, then press Enter", turns), wheel,
               turns});
   const auto moved = travel(start, manual.sample(), layout);
   const std::size_t most = largest(moved);

@@ -22,11 +22,14 @@ struct WheelLayout {
   int wheels = 0;
   /// Axis about which a wheel turns when its angle grows, body axes.
   std::array<Vec3, kMaxMotors> axis_B{};
+  std::array<const char*, kMaxMotors> place{};  // of a wheel, in words; null: nothing to say
   Vec3 body_inertia_kg_m2 = Vec3::Ones();
   double counts_per_rev = 0.0;
   MotorParameters motor;
   /// Wheels on one axle kick alike: only eyes can tell them apart.
   bool told_apart_by_gyro() const;
+  /// "wheel 1 (right)".
+  std::string name(int wheel) const;
 };
 
 /// A wheel rolls on the ball and so turns against it; T_ob is about the ball.

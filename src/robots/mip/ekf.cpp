@@ -127,7 +127,7 @@ void MipEkfModel::measure(const Vec<14>& x, const Vec2& u, Vec<6>& y, Mat<6, 14>
   H(kGyro + 2, kMountX) = -mount_ * (across + dx * turn);
   H(kGyro + 2, kMountY) = mount_ * (x(kThetaDot) - dy * turn);
 
-  // Left, right; (3.18).
+  // Right, left; (3.18).
   y(kWheel) = x(kPhi) + yaw_to_wheel_ * x(kPsi);
   y(kWheel + 1) = x(kPhi) - yaw_to_wheel_ * x(kPsi);
   H(kWheel, kPhi) = H(kWheel + 1, kPhi) = 1.0;

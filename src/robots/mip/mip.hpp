@@ -31,7 +31,7 @@ struct MipParameters {
   double yaw_to_wheel() const noexcept { return d / (2.0 * r); }  // wheel angle per yaw angle, (3.18)
 };
 
-/// Wheels: left, right. Axes: u_x drives both, u_z turns: u_1 = u_x + u_z, u_2 = u_x - u_z. [T] (3.16)
+/// Wheels: right, left. Axes: u_x drives both, u_z turns left: u_1 = u_x + u_z, u_2 = u_x - u_z. [T] (3.16)
 class MipKinematics {
  public:
   using Input = Vec2;

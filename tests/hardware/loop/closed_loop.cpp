@@ -30,8 +30,8 @@ PinRobot PinRobot::edumip() {
   return {"Edumip",
           "/mnt/config/edumip.toml",
           "/mnt/config/boards/robotics_cape_edumip.toml",
-          {{kPwm2A, pin_of(kGpio2, 9), pin_of(kGpio2, 8), -1, 2, +1},
-           {kPwm1B, pin_of(kGpio1, 16), pin_of(kGpio2, 17), +1, 1, -1}},
+          {{kPwm1B, pin_of(kGpio1, 16), pin_of(kGpio2, 17), +1, 1, -1},
+           {kPwm2A, pin_of(kGpio2, 9), pin_of(kGpio2, 8), -1, 2, +1}},
           {}};
 }
 
@@ -39,7 +39,7 @@ PinRobot PinRobot::edumip_blue() {
   PinRobot robot = edumip();
   robot.name = "EdumipBlue";
   robot.board = "/mnt/config/boards/beaglebone_blue_edumip.toml";
-  robot.wheels[1].in2 = pin_of(kGpio0, 10);
+  robot.wheels[0].in2 = pin_of(kGpio0, 10);
   return robot;
 }
 
