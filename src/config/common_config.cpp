@@ -31,6 +31,15 @@ void expect_robot(Section& robot, const std::string& type) {
   if (found != type) robot.fail("type", "\"" + found + "\" is not this robot; expected " + type);
 }
 
+void require_room(const Section& reference, const DutyBudget& budget) {
+  if (budget.share > budget.of_friction) return;
+  reference.fail("duty_share", "is " + std::to_string(budget.share) +
+                                   ", all of which compensated friction takes (" +
+                                   std::to_string(budget.of_friction) +
+                                   "): no command would move the robot; raise it, or lower "
+                                   "friction.compensation");
+}
+
 MotorParameters read_motor(Section s) {
   MotorParameters m;
   m.resistance_ohm = s.number("resistance_ohm", 0.01, 1000.0);

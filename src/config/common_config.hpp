@@ -8,6 +8,7 @@
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/actuate/safety.hpp"
 #include "equipoise/control/chain.hpp"
+#include "equipoise/control/governor.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/sense/attitude_filter.hpp"
@@ -23,6 +24,9 @@ double number_or(Section& s, const char* key, double otherwise, double min, doub
 
 /// The name under which a file has this world; logs of earlier builds call the nominal one full.
 std::string world_key(const Section& worlds, const std::string& fidelity);
+
+/// ConfigError when compensated friction takes all that a command may ask for.
+void require_room(const Section& reference, const DutyBudget& budget);
 
 MotorParameters read_motor(Section s);
 Calibration read_calibration(Section s, int wheels);

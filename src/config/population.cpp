@@ -70,6 +70,30 @@ void draw(const toml::table& ranges, const toml::table& world, const std::string
   }
 }
 
+/// Every key is one of some world's, and its range is one.
+void check(const toml::table& ranges, const std::vector<const toml::table*>& worlds,
+           const std::string& prefix) {
+  for (const auto& [name, node] : ranges) {
+    const std::string key = prefix + std::string(name.str());
+    const toml::table* nested = node.as_table();
+    const bool is_range = nested == nullptr || is_sigma(*nested);
+    std::vector<const toml::table*> tables;
+    bool known = false;
+    for (const toml::table* world : worlds) {
+      const toml::node* target = world->get(name.str());
+      if (target == nullptr) continue;
+      known = known || target->is_table() != is_range;
+      if (target->is_table()) tables.push_back(target->as_table());
+    }
+    if (!known) throw ConfigError("population." + key + ": no world has such a key");
+    if (is_range) {
+      (void)range_of(node, "population." + key);
+    } else {
+      check(*nested, tables, key + ".");
+    }
+  }
+}
+
 std::string exact(double value) {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), "%.17g", value);
@@ -87,6 +111,16 @@ double normal_draw(std::int64_t robot, const std::string& key, std::size_t eleme
   for (std::uint64_t i = 1; i <= 12; ++i)
     sum += unit(robot, key, (static_cast<std::uint64_t>(element) << 8U) + i);
   return sum;
+}
+
+void check_population(const toml::table& root) {
+  const toml::table* ranges = root["population"].as_table();
+  const toml::table* worlds = root["world"].as_table();
+  if (ranges == nullptr || worlds == nullptr) return;
+  std::vector<const toml::table*> all;
+  for (const auto& [name, world] : *worlds)
+    if (world.is_table()) all.push_back(world.as_table());
+  check(*ranges, all, "");
 }
 
 std::vector<Drawn> draw_robot(const std::string& path, const std::vector<std::string>& overrides,

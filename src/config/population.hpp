@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "config/toml_reader.hpp"
+
 namespace equipoise::config {
 
 /// One key of a world, e.g. disturbance.static_ratio, as drawn; several values for an array.
@@ -18,6 +20,9 @@ struct Drawn {
 /// Robot 0 is the world as configured: nothing is drawn. ConfigError for a key that the world lacks.
 std::vector<Drawn> draw_robot(const std::string& path, const std::vector<std::string>& overrides,
                               const std::string& world, std::int64_t robot);
+
+/// At every start, whether or not a robot is drawn: ConfigError for a key that no world has.
+void check_population(const toml::table& root);
 
 /// `drawn` before `overrides`, so that these have the last word.
 std::vector<std::string> with_robot_drawn(const std::vector<Drawn>& drawn, const std::string& world,

@@ -1,4 +1,4 @@
-"""Signs of both robots where only 3-D geometry decides: MuJoCo's wheels, at the side where a robot has them."""
+"""Signs of both robots where only 3-D geometry decides: MuJoCo's wheels, each on its side."""
 
 import subprocess
 import tomllib
@@ -6,9 +6,10 @@ import tomllib
 import numpy as np
 import pytest
 
-mujoco = pytest.importorskip(
+pytest.importorskip(
     "mujoco", reason="mujoco is not installed (tools/test installs tools/requirements-optional.txt)"
 )
+import mujoco
 from equipoise_tools import mujoco_client
 from equipoise_tools.paths import import_lcm_types
 

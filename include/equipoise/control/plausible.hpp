@@ -2,6 +2,7 @@
 // In: linear model, parameters -> out: what is wrong, if anything. Start-up only.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -30,5 +31,11 @@ std::optional<DesignProblem> outside(const std::string& parameter, const std::st
 std::optional<DesignProblem> beyond_recovery(const CMatrix& A, const CMatrix& b, Eigen::Index i);
 /// Too little phase or delay margin of the full-state loop broken at u, or no stability.
 std::optional<DesignProblem> without_margin(const SampledSystem& loop, const CMatrix& K);
+/// The same under u = -K(z) (x, u before); `pole`: the closed loop's largest.
+std::optional<DesignProblem> without_margin(const SampledSystem& loop, double pole,
+                                            const std::function<CMatrix(Complex z)>& K);
+
+/// A model whose fastest mode, 1/s, the filters' step of 5 ms (Heun's) cannot follow. `parameter`: its keys.
+std::optional<DesignProblem> too_fast_for_the_tick(const std::string& parameter, const CMatrix& A);
 
 }  // namespace equipoise

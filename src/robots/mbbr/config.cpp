@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "config/common_config.hpp"
+#include "config/population.hpp"
 
 namespace equipoise {
 namespace {
@@ -58,7 +59,7 @@ GainSchedule<Columns> read_schedule(Section& parent, const std::string& key,
   return schedule;
 }
 
-MbbrReferenceParams read_reference(Section s, double ball_radius_m) {
+MbbrReferenceParams read_reference(Section s, const MbbrParameters& robot, double friction_share) {
   MbbrReferenceParams p;
   p.slc_unit = s.number("slc_unit_rad_per_rad_s", 0.0, 1.0);
   p.slc_sign = s.number("slc_sign", -1.0, 1.0);
@@ -66,11 +67,12 @@ MbbrReferenceParams read_reference(Section s, double ball_radius_m) {
       s.choice("rate_feedback", {"body", "euler"}) == 0 ? RateFeedback::kBody : RateFeedback::kEuler;
   p.frame = s.choice("filter_frame", {"inertial", "yaw"}) == 0 ? FilterFrame::kInertial : FilterFrame::kYaw;
   p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
-  p.max_jerk_m_s3 = s.number("max_jerk_m_s3", 0.01, 1e9);
+  p.feasible_acceleration_m_s2 = feasible_acceleration_m_s2(robot);
+  p.max_jerk_m_s3 = std::min(s.number("max_jerk_m_s3", 0.01, 1e9), feasible_jerk_m_s3(robot));
   p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
   p.floor_yaw_acceleration_rad_s2 = s.number("floor_yaw_acceleration_rad_s2", 0.01, 1000.0);
-  p.budget.share = s.number("duty_share", 0.05, 1.0);
-  p.ball_radius_m = ball_radius_m;
+  p.budget = mbbr_duty_budget(robot, s.number("duty_share", 0.05, 1.0), friction_share);
+  p.ball_radius_m = robot.r;
   p.schedule =
       read_schedule<MbbrReferenceParams::kColumns>(s, "schedule", {"slc_gain", "slc_pole", "low_pass_rad_s"});
   s.finish();
@@ -173,9 +175,8 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   estimator.finish();
   c.estimators.robot = c.robot;
 
-  c.reference = read_reference(root.table("reference"), c.robot.r);
-  c.reference.feasible_acceleration_m_s2 = feasible_acceleration_m_s2(c.robot);
-  c.reference.budget = mbbr_duty_budget(c.robot, c.reference.budget.share, c.friction.gain);
+  const Section reference = root.table("reference");
+  c.reference = read_reference(reference, c.robot, c.friction.gain);
   Section controller = root.table("controller");
   c.thesis = read_thesis(controller.table("thesis"));
   Section scheduled = controller.table("scheduled");
@@ -184,6 +185,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   if (const auto problem = design_problem(c.robot, c.design, c.motor.k1()))
     (problem->parameter.empty() ? scheduled.fail("design", problem->why)
                                 : robot.fail(problem->parameter, problem->why));
+  config::require_room(reference, c.reference.budget);
   c.scheduled.gains = design_mbbr(c.robot, c.design);
   scheduled.finish();
   controller.finish();
@@ -199,7 +201,8 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
         read_mbbr_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
   }
   world.finish();
-  if (root.has("population")) root.table("population");  // read when a robot is drawn
+  if (root.has("population")) root.table("population");
+  config::check_population(document.root());
   root.finish();
   loaded.keys = document.keys();
   loaded.sha256 = document.sha256();

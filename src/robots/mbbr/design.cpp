@@ -115,6 +115,7 @@ std::optional<DesignProblem> design_problem(const MbbrParameters& p, const MbbrD
   for (const double yaw_rate : {0.0, 2.0 * kPi * d.last_hz}) {
     const MbbrLinear s = mbbr_linear(p, yaw_rate);
     if (auto bad = beyond_recovery(s.A, s.b, 0)) return bad;
+    if (auto bad = too_fast_for_the_tick("k1_N_m, k2_ball_N_m_s or the inertias", s.A)) return bad;
     const CMatrix K = mbbr_lqr(p, d, yaw_rate);
     if (auto bad = without_margin(sampled(s.A, s.b, kTickS, d.input_delay_s), K)) return bad;
   }
@@ -124,6 +125,11 @@ std::optional<DesignProblem> design_problem(const MbbrParameters& p, const MbbrD
 double feasible_acceleration_m_s2(const MbbrParameters& p) {
   const MbbrLinear s = mbbr_linear(p, 0.0);
   return recoverable(s.A, s.b, 0).limit / 3.0 / steady_motion(s).x() * p.r;
+}
+
+double feasible_jerk_m_s3(const MbbrParameters& p) {
+  const MbbrLinear s = mbbr_linear(p, 0.0);
+  return feasible_acceleration_m_s2(p) * recoverable(s.A, s.b, 0).pole_rad_s;
 }
 
 DutyBudget mbbr_duty_budget(const MbbrParameters& p, double share, double friction_share) {

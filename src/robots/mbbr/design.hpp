@@ -62,6 +62,8 @@ std::optional<DesignProblem> design_problem(const MbbrParameters& p, const MbbrD
 
 /// Acceleration whose lean takes a third of the tilt that the full torque can bring back.
 double feasible_acceleration_m_s2(const MbbrParameters& p);
+/// And with which that lean comes no faster than the robot falls.
+double feasible_jerk_m_s3(const MbbrParameters& p);
 
 /// What steady motion takes of each wheel's duty; `friction_share`: of Coulomb friction that is compensated.
 DutyBudget mbbr_duty_budget(const MbbrParameters& p, double share, double friction_share);

@@ -1,6 +1,7 @@
 #include "robots/mip/config.hpp"
 
 #include "config/common_config.hpp"
+#include "config/population.hpp"
 
 namespace equipoise {
 namespace {
@@ -67,7 +68,7 @@ MipEstimatorParams read_estimators(Section s, const MipParameters& robot) {
 MipReferenceParams read_reference(Section s, const MipParameters& robot, double friction_share) {
   MipReferenceParams p;
   p.max_acceleration_m_s2 = s.number("max_acceleration_m_s2", 0.01, 100.0);
-  p.max_jerk_m_s3 = s.number("max_jerk_m_s3", 0.01, 1e9);
+  p.max_jerk_m_s3 = std::min(s.number("max_jerk_m_s3", 0.01, 1e9), feasible_jerk_m_s3(robot));
   p.max_yaw_acceleration_rad_s2 = s.number("max_yaw_acceleration_rad_s2", 0.01, 1000.0);
   const MipWheelBudget wheel{s.number("duty_share", 0.05, 1.0),
                              s.number("max_wheel_rate_rad_s", 0.1, 1000.0)};
@@ -152,7 +153,8 @@ Loaded<MipConfig> read_mip(const Document& document) {
   c.friction.gain = friction.number("compensation", 0.0, 1.5);
   friction.finish();
   c.estimators = read_estimators(root.table("estimator"), c.robot);
-  c.reference = read_reference(root.table("reference"), c.robot, c.friction.gain);
+  const Section reference = root.table("reference");
+  c.reference = read_reference(reference, c.robot, c.friction.gain);
 
   Section controller = root.table("controller");
   Section slc = controller.table("slc");
@@ -168,6 +170,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
   if (const auto problem = design_problem(c.robot, c.design, c.motor.k1()))
     (problem->parameter.empty() ? lqr.fail("design", problem->why)
                                 : robot.fail(problem->parameter, problem->why));
+  config::require_room(reference, c.reference.budget);
   c.slc.gains = c.lqr.gains = design_mip(c.robot, c.design);
   controller.finish();
   c.safety = config::read_safety(root.table("safety"));
@@ -181,7 +184,8 @@ Loaded<MipConfig> read_mip(const Document& document) {
     c.world[i] = read_mip_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
   }
   world.finish();
-  if (root.has("population")) root.table("population");  // read when a robot is drawn
+  if (root.has("population")) root.table("population");
+  config::check_population(document.root());
   root.finish();
   loaded.keys = document.keys();
   loaded.sha256 = document.sha256();
@@ -201,6 +205,9 @@ Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin,
 }
 
 MipSlcPipeline::Params MipConfig::slc_pipeline() const {
+  if (const auto problem = slc.published ? std::nullopt : slc_problem(robot, design, slc.gains.slc))
+    throw ConfigError("controller.slc.design: " + problem->why +
+                      "; change it (equipoise design shows its margins) or choose --controller lqr");
   return {robot, calibration, estimators, reference, slc, friction, motor, safety, attitude};
 }
 

@@ -69,10 +69,39 @@ std::optional<DesignProblem> design_problem(const MipParameters& p, const MipDes
     return bad;
   const MipLinear s = mip_linear(p, 0.0);
   if (auto bad = beyond_recovery(s.A, s.b, 0)) return bad;
+  for (const CMatrix& A : {s.A, mip_yaw_linear(p).A}) {
+    if (auto bad = too_fast_for_the_tick("k1_N_m, k2_N_m_s or the inertias", A)) return bad;
+  }
   const MipGains g = design_mip(p, d);
   CMatrix K(1, 5);
   K << g.lqr.theta, g.lqr.phi, g.lqr.theta_dot, g.lqr.phi_dot, -g.lqr.u_before;
   return without_margin(sampled(s.A, s.b, kTickS, d.input_delay_s), K);
+}
+
+std::optional<DesignProblem> slc_problem(const MipParameters& p, const MipDesignParams& d,
+                                         const MipSlcGains& g) {
+  const MipLinear plant = mip_linear(p, 0.0);
+  const SampledSystem loop = sampled(plant.A, plant.b, kTickS, d.input_delay_s);
+  const auto response = [](const SecondOrder& c, Complex z) {
+    return (c.b0 * z * z + c.b1 * z + c.b2) / (z * z + c.a1 * z + c.a2);
+  };
+  const auto feedback = [&](Complex z) {
+    const Complex inner = response(g.D1, z);
+    return CMatrix{{inner, inner * response(g.D2, z), 0.0, 0.0, 0.0}};
+  };
+  // One tick of plant and compensators; states x, u before, D1's two, D2's two.
+  constexpr Eigen::Index kAll = 9;
+  CMatrix step = CMatrix::Zero(kAll, kAll);
+  for (Eigen::Index i = 0; i < kAll; ++i) {
+    const CMatrix s = CMatrix::Identity(kAll, kAll).col(i);
+    const Complex theta_ref = s(7, 0) - g.D2.b0 * s(1, 0);
+    const Complex error = theta_ref - s(0, 0);
+    const Complex u = g.D1.b0 * error + s(5, 0);
+    step.col(i).head(4) = loop.A * s.topRows(4) + loop.B * u + loop.B_late * s(4, 0);
+    step.col(i).tail(5) << u, g.D1.b1 * error - g.D1.a1 * u + s(6, 0), g.D1.b2 * error - g.D1.a2 * u,
+        -g.D2.b1 * s(1, 0) - g.D2.a1 * theta_ref + s(8, 0), -g.D2.b2 * s(1, 0) - g.D2.a2 * theta_ref;
+  }
+  return without_margin(loop, eigenvalues(step).cwiseAbs().maxCoeff(), feedback);
 }
 
 double feasible_acceleration_m_s2(const MipParameters& p) {
@@ -80,8 +109,14 @@ double feasible_acceleration_m_s2(const MipParameters& p) {
   return recoverable(s.A, s.b, 0).limit / 3.0 * wheel_per_lean(s) * p.r;
 }
 
+double feasible_jerk_m_s3(const MipParameters& p) {
+  const MipLinear s = mip_linear(p, 0.0);
+  return feasible_acceleration_m_s2(p) * recoverable(s.A, s.b, 0).pole_rad_s;
+}
+
 DutyBudget mip_duty_budget(const MipParameters& p, const MipWheelBudget& wheel, double friction_share) {
-  const double against_back_emf = (p.k2 + p.mu_v) / p.k1;
+  constexpr double kLeast_s = 1e-9;  // without back-EMF and friction only the wheels' rate is a limit
+  const double against_back_emf = std::max((p.k2 + p.mu_v) / p.k1, kLeast_s);
   DutyBudget b;
   b.of_friction = friction_share * p.mu_c / p.k1;
   b.share = std::min(wheel.duty_share, b.of_friction + against_back_emf * wheel.max_rate_rad_s);

@@ -100,8 +100,14 @@ inline constexpr SecondOrder kMipPublishedD2{0.18856, -0.37209, 0.18354, -1.8604
 std::optional<DesignProblem> design_problem(const MipParameters& p, const MipDesignParams& d,
                                             double wheel_torque_N_m);
 
+/// The same of successive loop closure, which only who chooses it needs.
+std::optional<DesignProblem> slc_problem(const MipParameters& p, const MipDesignParams& d,
+                                         const MipSlcGains& g);
+
 /// Acceleration whose lean takes a third of the tilt that the full torque can bring back.
 double feasible_acceleration_m_s2(const MipParameters& p);
+/// And with which that lean comes no faster than the robot falls.
+double feasible_jerk_m_s3(const MipParameters& p);
 
 /// What a command may ask of a wheel in steady motion.
 struct MipWheelBudget {

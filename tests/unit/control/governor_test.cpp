@@ -136,6 +136,14 @@ TEST(DutyBudget, OfTheMipKeepsItsWheelsBelowTheirRate) {
   EXPECT_NEAR(b.allowed_yaw_rate(30.0), 18.0 * p.r / to_wheel, 1e-9);
 }
 
+TEST(DutyBudget, WithoutBackEmfTheWheelsRateIsTheLimit) {
+  MipParameters p;
+  p.k2 = p.mu_v = p.mu_c = 0.0;
+  const DutyBudget b = mip_duty_budget(p, {0.75, 18.0}, 0.8);
+  EXPECT_NEAR(b.allowed_speed(0.0), 18.0 * p.r, 1e-6);
+  EXPECT_NEAR(b.allowed_yaw_rate(1e3), 18.0 * p.r / (p.d / 2.0), 1e-5);
+}
+
 TEST(Allocate, KeepsBalanceAndGivesYawTheRest) {
   const Vec2 balance(0.7, 0.7);
   EXPECT_LT((within<2>(balance, Vec2(0.2, -0.2), 1.0) - Vec2(0.9, 0.5)).norm(), 1e-12);

@@ -90,5 +90,13 @@ TEST(WithoutMargin, WhatIsNotStableHasNone) {
   EXPECT_EQ(problem->why, "no gain stabilises this robot");
 }
 
+TEST(TooFastForTheTick, IsAModeBeyondOnePerTick) {
+  const auto decaying = [](double rate_1_s) { return CMatrix{{-rate_1_s, 1.0}, {0.0, -1.0}}; };
+  EXPECT_FALSE(too_fast_for_the_tick("key", decaying(199.0)));
+  const auto problem = too_fast_for_the_tick("key", decaying(201.0));
+  ASSERT_TRUE(problem);
+  EXPECT_EQ(problem->parameter, "key");
+}
+
 }  // namespace
 }  // namespace equipoise
