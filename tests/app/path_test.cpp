@@ -127,5 +127,29 @@ TEST(WaypointPath, RefusesWhatTheRobotCannotDo) {
   EXPECT_NE(refusal("waltz", {2.0, 7.0, 1.0}).find("rad/s of yaw"), std::string::npos);
 }
 
+TEST(WaypointPath, ATimeThatNoTickReachesIsRefused) {
+  for (const char* end : {"86401", "1e12", "1e17", "1e300"}) {
+    const std::string path = waypoint_file("0 0 0 0\n1 0.1 0 0\n2 8 0 0\n" + std::string(end) + " 8 0 0\n");
+    EXPECT_NE(refusal(path, {}).find(":4: time exceeds 86400 s"), std::string::npos) << end;
+  }
+}
+
+TEST(WaypointPath, AJumpBetweenTwoTicksIsRefused) {
+  const std::string jump = waypoint_file("0 0 0 0\n4.0001 0 0 0\n4.0002 3 0 0\n8 3 0 0\n");
+  EXPECT_NE(refusal(jump, kAnything), "");
+}
+
+TEST(WaypointPath, ARobotThatGoesAlongItsNoseRefusesCusps) {
+  PathLimits nose = kAnything;
+  nose.along_nose = true;
+  // Out and back: half a turn within a tick, at 4 s on a tick and at 4.0025 s between two.
+  for (const char* back : {"0 0 0 0\n4 0.4 0 0\n8 0 0 0\n", "0 0 0 0\n4.0025 0.4 0 0\n8.005 0 0 0\n"}) {
+    EXPECT_EQ(refusal(waypoint_file(back), kAnything), "") << "a ball goes back";
+    EXPECT_NE(refusal(waypoint_file(back), nose).find("asks for"), std::string::npos);
+  }
+  EXPECT_EQ(refusal(waypoint_file("0 0 0 0\n4 -0.4 0 0\n"), nose), "") << "it begins along the path";
+  for (const char* name : {"circle", "figure8", "square"}) EXPECT_EQ(refusal(name, nose), "");
+}
+
 }  // namespace
 }  // namespace equipoise::app

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <sstream>
 #include <vector>
 
 #include "app/text/errors.hpp"
+#include "app/text/files.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -18,6 +19,8 @@ constexpr double kEight_m = 0.4;    // half the width of the eight
 constexpr double kSide_m = 0.6;     // of the square, corners included
 constexpr double kCorner_m = 0.15;  // their radius
 constexpr double kWaltz_rad_s = kPi;
+constexpr double kLongest_s = 86400.0;  // of a file: every tick of it is checked before the start
+constexpr double kStanding_m_s = 1e-6;
 
 /// Time that has passed on the path when it is begun smoothly, and its rate.
 std::array<double, 2> eased(double t_s) noexcept {
@@ -132,10 +135,10 @@ class Waypoints : public Path {
 };
 
 std::unique_ptr<Waypoints> read_waypoints(const std::string& file_name) {
-  std::ifstream file(file_name);
-  if (!file)
-    throw InputError("--path " + file_name +
-                     ": neither circle, figure8, square, waltz nor a file that can be read");
+  std::error_code ignored;
+  if (!std::filesystem::exists(file_name, ignored))
+    throw InputError("--path " + file_name + ": neither circle, figure8, square, waltz nor a file");
+  std::istringstream file(read_text(file_name));
   std::vector<double> t_s;
   std::vector<Row> rows;
   std::string line;
@@ -156,6 +159,7 @@ std::unique_ptr<Waypoints> read_waypoints(const std::string& file_name) {
     if (!std::isfinite(t) || !row.allFinite()) fail("is not finite");
     if (t_s.empty() && t != 0.0) fail("the first waypoint is at time 0");
     if (!t_s.empty() && t <= t_s.back()) fail("times must increase");
+    if (t > kLongest_s) fail("time exceeds 86400 s, a day");
     t_s.push_back(t);
     rows.push_back(row);
   }
@@ -165,7 +169,9 @@ std::unique_ptr<Waypoints> read_waypoints(const std::string& file_name) {
   return std::make_unique<Waypoints>(std::move(t_s), std::move(rows));
 }
 
+/// What the robot is told at every tick, and that it then goes where the path goes.
 void require_feasible(const std::string& name, const Path& path, double until_s, const PathLimits& limits) {
+  constexpr double kOff_rad = kPi / 4.0;  // of a heading that is summed in steps
   const auto require = [&](double value, double limit, const char* what, double t_s) {
     if (value <= limit) return;
     std::ostringstream text;
@@ -175,14 +181,31 @@ void require_feasible(const std::string& name, const Path& path, double until_s,
     throw InputError(text.str());
   };
   const auto ticks = static_cast<std::int64_t>(std::ceil(until_s * kTickHz));
-  Vec2 before = Vec2::Zero();
+  PathPoint before = path.at(0.0);
+  double heading = 0.0;  // of a robot that goes along its nose
+  bool started = false;
   for (std::int64_t i = 1; i <= ticks; ++i) {
     const double t_s = static_cast<double>(i) * kTickS;
     const PathPoint point = path.at(t_s);
-    require(point.velocity_W_m_s.norm(), limits.speed_m_s, "m/s", t_s);
-    require((point.velocity_W_m_s - before).norm() / kTickS, limits.acceleration_m_s2, "m/s^2", t_s);
-    require(std::abs(point.yaw_rate_rad_s), limits.yaw_rate_rad_s, "rad/s of yaw", t_s);
-    before = point.velocity_W_m_s;
+    const Vec2 v = point.velocity_W_m_s;
+    require(v.norm(), limits.speed_m_s, "m/s", t_s);
+    require((v - before.velocity_W_m_s).norm() / kTickS, limits.acceleration_m_s2, "m/s^2", t_s);
+    require((point.position_W_m - before.position_W_m).norm() / kTickS,
+            limits.speed_m_s + limits.acceleration_m_s2 * kTickS, "m/s between two ticks", t_s);
+    before = point;
+    if (!limits.along_nose) {
+      require(std::abs(point.yaw_rate_rad_s), limits.yaw_rate_rad_s, "rad/s of yaw", t_s);
+      continue;
+    }
+    const double yaw_rate_rad_s = along_its_nose(path, t_s).yaw_rate_rad_s;
+    require(std::abs(yaw_rate_rad_s), limits.yaw_rate_rad_s, "rad/s of yaw", t_s);
+    if (v.norm() > kStanding_m_s) {
+      if (!started) heading = std::atan2(v.y(), v.x());
+      started = true;
+      const Vec2 nose = rotate(-heading, v);
+      require(std::abs(std::atan2(nose.y(), nose.x())), kOff_rad, "rad of turn on the spot", t_s);
+    }
+    heading += kTickS * yaw_rate_rad_s;
   }
 }
 
@@ -210,7 +233,6 @@ std::unique_ptr<Path> make_path(const std::string& name, double speed_m_s, const
 }
 
 PathPoint along_its_nose(const Path& path, double t_s) noexcept {
-  constexpr double kStanding_m_s = 1e-6;
   PathPoint point = path.at(t_s);
   const Vec2 v = point.velocity_W_m_s;
   const Vec2 next = path.at(t_s + kTickS).velocity_W_m_s;

@@ -22,6 +22,7 @@ struct PathLimits {
   double speed_m_s = 0.6;  // beyond it the robot is a danger to people
   double acceleration_m_s2 = 0.5;
   double yaw_rate_rad_s = 6.0 * kPi;
+  bool along_nose = false;  // for a robot that cannot go sideways
 };
 
 class Path {

@@ -12,6 +12,7 @@ Script script_for(const ConfiguredRobot& robot, double drive_mps, double yaw_rat
   if (!name.empty()) {
     PathLimits limits;
     limits.acceleration_m_s2 = robot.max_acceleration_m_s2;
+    limits.along_nose = script.along_nose;
     script.path = make_path(name, drive_mps != 0.0 ? drive_mps : kPathSpeed_m_s, limits);
   }
   return script;
