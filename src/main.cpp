@@ -3,7 +3,14 @@
 #include <exception>
 
 #include "app/cli/commands.hpp"
+#include "app/text/files.hpp"
 #include "equipoise/config.hpp"
+
+namespace {
+void say(const std::exception& error) {
+  std::fprintf(stderr, "equipoise: %s\n", equipoise::app::printable(error.what()).c_str());
+}
+}  // namespace
 
 /// Exit codes: 0 success, 1 a job that failed, 2 bad usage or input.
 int main(int argc, char** argv) {
@@ -16,13 +23,13 @@ int main(int argc, char** argv) {
     equipoise::app::add_commands(line.root());
     return line.run(argc, argv);
   } catch (const equipoise::ConfigError& error) {
-    std::fprintf(stderr, "equipoise: %s\n", error.what());
+    say(error);
     return 2;
   } catch (const equipoise::app::InputError& error) {
-    std::fprintf(stderr, "equipoise: %s\n", error.what());
+    say(error);
     return 2;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "equipoise: %s\n", error.what());
+    say(error);
     return 1;
   }
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 import tempfile
@@ -29,19 +30,31 @@ _LARGEST_MESSAGE = 1 << 24
 _READ_BYTES = 1 << 20
 _DECODED_AT_ONCE = 4096
 _CALIBRATED_AT_ONCE = 1 << 16
+_MOST_CHANNELS = 200  # each takes a file; ours have twenty
+
+
+def _starts_later(path: Path) -> bool:
+    """An LCM log whose events are not numbered from 0: a further part of another."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(12)
+    return head.startswith(_SYNC) and int.from_bytes(head[4:], "big", signed=True) > 0
 
 
 def parts_of(path: Path) -> list[Path]:
     """The files of a log in order: NAME.lcm, NAME.0001.lcm, ...; the first of them may have been deleted."""
-    named = re.compile(re.escape(path.stem) + r"\.(\d{4,})" + re.escape(path.suffix))
+    named = re.compile(re.escape(path.stem) + r"\.(\d{4}|[1-9]\d{4,8})" + re.escape(path.suffix))
     further = []
     if path.parent.is_dir():
         further = [(int(m[1]), file) for file in path.parent.iterdir() if (m := named.fullmatch(file.name))]
-    return [path] * path.exists() + [file for _, file in sorted(further)]
+    return [path] * path.exists() + [file for _, file in sorted(further) if _starts_later(file)]
 
 
 def scan(path: Path, notes: list[str]) -> Iterator[tuple[int, str, bytes]]:
     """(utime, channel, message) of every intact event of one file; adds notes on what is not."""
+    if path.exists() and not path.is_file():
+        raise UserError(f"{path}: is no regular file")  # a pipe or a device might never end
     with path.open("rb") as file:
         size = path.stat().st_size
         data, base, at = b"", 0, 0  # data[0] stands at `base` in the file
@@ -68,7 +81,10 @@ def scan(path: Path, notes: list[str]) -> Iterator[tuple[int, str, bytes]]:
             if has(_HEADER.size) and data.startswith(_SYNC, at):
                 _, _, utime, channel_bytes, message_bytes = _HEADER.unpack_from(data, at)
                 whole = _HEADER.size + channel_bytes + message_bytes
-                if channel_bytes <= _LONGEST_CHANNEL and message_bytes <= _LARGEST_MESSAGE and has(whole):
+                if base + at + whole > size:
+                    size = os.fstat(file.fileno()).st_size  # it may be growing
+                possible = channel_bytes <= _LONGEST_CHANNEL and message_bytes <= _LARGEST_MESSAGE
+                if possible and base + at + whole <= size and has(whole):
                     body = at + _HEADER.size
                     name = data[body : body + channel_bytes]
                     if name not in channels:
@@ -247,6 +263,7 @@ class Log(dict[str, np.ndarray]):
     def _read(self) -> None:
         channels: dict[tuple[str, bytes], _Channel] = defaultdict(_Channel)
         broken: dict[tuple[str, bytes], str] = {}
+        crowd = 0
         parts = parts_of(self.path) or [self.path]
         for part in parts:
             notes: list[str] = []
@@ -254,6 +271,9 @@ class Log(dict[str, np.ndarray]):
                 for _, channel, message in scan(part, notes):
                     key = channel, message[:8]
                     if key in broken:
+                        continue
+                    if key not in channels and len(channels) >= _MOST_CHANNELS:
+                        crowd += 1
                         continue
                     try:
                         channels[key].add(message)
@@ -264,6 +284,8 @@ class Log(dict[str, np.ndarray]):
             self.notes += [f"{part.name}: {note}" for note in notes] if len(parts) > 1 else notes
         if not channels:
             raise UserError(f"{self.path}: is not an LCM event log, or holds no whole event")
+        if crowd:
+            self.notes.append(f"more than {_MOST_CHANNELS} channels: {crowd} messages are left out")
         unknown: Counter[str] = Counter()
         for key, messages in channels.items():
             channel = key[0]

@@ -11,29 +11,18 @@
 namespace equipoise::config {
 namespace {
 
-// A dot is a level of tables, which are read and freed by recursion; no file of ours has ten in a line.
+// A dot may be a level of tables, which are read and freed by recursion; no file of ours has ten in a line.
+// Those in strings and comments count, too: what is a string is for the parser to say.
 constexpr int kMostDotsInALine = 100;
 constexpr std::size_t kLongestKey = 200;
 
 void refuse_deep_nesting(const std::string& text, const std::string& origin) {
   int line = 1;
   int dots = 0;
-  char quote = '\0';
-  bool comment = false;
   for (const char c : text) {
     if (c == '\n') {
       ++line;
       dots = 0;
-      quote = '\0';
-      comment = false;
-    } else if (comment) {
-      continue;
-    } else if (quote != '\0') {
-      if (c == quote) quote = '\0';
-    } else if (c == '"' || c == '\'') {
-      quote = c;
-    } else if (c == '#') {
-      comment = true;
     } else if (c == '.' && ++dots > kMostDotsInALine) {
       throw ConfigError(origin + ":" + std::to_string(line) + ": more than " +
                         std::to_string(kMostDotsInALine) + " dots in a line");

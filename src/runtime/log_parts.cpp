@@ -1,10 +1,12 @@
 #include "equipoise/runtime/log_parts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <fstream>
 
 namespace equipoise::runtime {
 namespace {
@@ -37,8 +39,44 @@ std::string with_middle(const fs::path& path, const std::string& middle) {
   return (path.parent_path() / (path.stem().string() + "." + middle + path.extension().string())).string();
 }
 
-bool is_stamp(const std::string& text) {  // 20261122T014503Z, and .0001 of a part behind it
-  return digits(text, 0, 8) && digits(text, 9, 6) && text[8] == 'T' && text.size() > 15 && text[15] == 'Z';
+/// Takes `count` or more digits from the front.
+bool take_digits(std::string* text, std::size_t count, bool more) {
+  std::size_t n = 0;
+  while (n < text->size() && std::isdigit(static_cast<unsigned char>((*text)[n])) != 0) ++n;
+  if (n < count || (n > count && !more)) return false;
+  text->erase(0, n);
+  return true;
+}
+bool take(std::string* text, char c) {
+  if (text->empty() || text->front() != c) return false;
+  text->erase(0, 1);
+  return true;
+}
+
+/// What kept_name writes: 20261122T014503Z, -2 of a second in that second, .0001 of a part behind it.
+bool is_stamp(std::string text) {
+  if (!take_digits(&text, 8, false) || !take(&text, 'T') || !take_digits(&text, 6, false) ||
+      !take(&text, 'Z'))
+    return false;
+  if (take(&text, '-') && !take_digits(&text, 1, true)) return false;
+  if (take(&text, '.') && !take_digits(&text, 4, true)) return false;
+  return text.empty();
+}
+
+/// Event number at the start of an LCM log; -1: no log.
+std::int64_t first_event_number(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return -1;
+  std::array<char, 12> head{};
+  std::ifstream file(path, std::ios::binary);
+  constexpr std::array<unsigned char, 4> kSync{0xED, 0xA1, 0xDA, 0x01};
+  if (!file.read(head.data(), head.size()) ||
+      !std::equal(kSync.begin(), kSync.end(), head.begin(),
+                  [](unsigned char a, char b) { return a == static_cast<unsigned char>(b); }))
+    return -1;
+  std::uint64_t number = 0;
+  for (std::size_t i = 4; i < head.size(); ++i) number = number << 8U | static_cast<unsigned char>(head[i]);
+  return static_cast<std::int64_t>(number);
 }
 
 }  // namespace
@@ -56,11 +94,15 @@ int log_part_number(const std::string& path, const std::string& part) {
   return std::stoi(part.substr(path.size() - suffix + 1));
 }
 
+/// The events of a log are numbered through all its parts: a file whose name merely looks like a part's is
+/// another log, begun at 0, or none.
 std::vector<std::string> existing_log_parts(const std::string& path) {
+  constexpr std::size_t kMostDigits = 9;
   std::vector<int> numbers;
   for (const std::string& middle : middles(path)) {
-    if (middle.size() >= 4 && middle.size() <= 9 && digits(middle, 0, middle.size()))
-      numbers.push_back(std::stoi(middle));
+    const bool number = middle.size() <= kMostDigits && digits(middle, 0, middle.size());
+    if (!number || with_middle(path, middle) != log_part(path, std::stoi(middle))) continue;
+    if (first_event_number(with_middle(path, middle)) > 0) numbers.push_back(std::stoi(middle));
   }
   std::sort(numbers.begin(), numbers.end());
   std::vector<std::string> parts;
@@ -68,6 +110,11 @@ std::vector<std::string> existing_log_parts(const std::string& path) {
   if (fs::exists(path, error)) parts.push_back(path);
   for (const int number : numbers) parts.push_back(log_part(path, number));
   return parts;
+}
+
+bool is_log_or_empty(const std::string& path) {
+  std::error_code error;
+  return fs::file_size(path, error) == 0 || first_event_number(path) >= 0;
 }
 
 std::vector<std::string> kept_logs(const std::string& path) {
@@ -85,11 +132,14 @@ std::string kept_name(const std::string& path, std::int64_t time_s) {
   gmtime_r(&time, &utc);
   char stamp[32];
   (void)std::strftime(stamp, sizeof stamp, "%Y%m%dT%H%M%SZ", &utc);
-  std::string name = with_middle(path, stamp);
-  std::error_code error;
-  for (int i = 2; !existing_log_parts(name).empty(); ++i)
-    name = with_middle(path, std::string(stamp) + "-" + std::to_string(i));
-  return name;
+  const std::vector<std::string> taken = middles(path);
+  std::string middle = stamp;
+  const auto is_taken = [&middle](const std::string& other) {
+    return other == middle || other.rfind(middle + ".", 0) == 0;
+  };
+  for (int i = 2; std::any_of(taken.begin(), taken.end(), is_taken); ++i)
+    middle = std::string(stamp) + "-" + std::to_string(i);
+  return with_middle(path, middle);
 }
 
 }  // namespace equipoise::runtime

@@ -66,6 +66,7 @@ bool LogWriter::create(const std::string& path) {
     return false;
   }
   fd_ = fd;
+  files_.push_back(path);
   file_bytes_ = 0;
   sync_fd_.store(fd, std::memory_order_relaxed);
   return true;
@@ -74,7 +75,16 @@ bool LogWriter::create(const std::string& path) {
 bool LogWriter::open(const std::string& path, const LogLimits& limits) {
   path_ = path;
   limits_ = limits;
+  std::error_code ignored;
+  if (std::filesystem::is_fifo(path, ignored)) {
+    error_ = path + ": log cannot be created: is a pipe";
+    return false;
+  }
   if (is_regular_or_absent(path) && !existing_log_parts(path).empty()) {
+    if (std::filesystem::exists(path) && !is_log_or_empty(path)) {
+      error_ = path + ": exists and is no log; choose another name";
+      return false;
+    }
     const int error = clear_name(path, limits.keep_previous);
     if (error != 0) {
       error_ = path + ": log cannot be created: " +
@@ -146,6 +156,9 @@ void LogWriter::close() {
   if (fd_ < 0) return;
   write_out();
   if (limits_.sync && fdatasync(fd_) != 0) fail(errno);
+  struct stat status {};
+  if (error_.empty() && fstat(fd_, &status) == 0 && status.st_nlink == 0)
+    error_ = files_.back() + ": the log was deleted while it was written";
   ::close(fd_);
   fd_ = -1;
 }
@@ -161,7 +174,10 @@ void LogWriter::sync_periodically() {
 
 void LogWriter::next_file() {
   const int previous = fd_;
-  if (!create(log_part(path_, ++part_))) return;
+  do {
+    ++part_;
+  } while (std::filesystem::exists(log_part(path_, part_)));  // whoever's that is
+  if (!create(log_part(path_, part_))) return;
   if (limits_.sync) (void)fdatasync(previous);
   ::close(previous);
   preamble(preamble_utime_, preamble_channel_, std::vector<std::uint8_t>(preamble_));
@@ -184,11 +200,12 @@ void LogWriter::make_room() {
     if (!kept.empty()) {
       std::filesystem::remove(kept.front(), ignored);
       kept.erase(kept.begin());
-    } else if (oldest_part_ == part_) {
+    } else if (files_.size() == 1) {
       fail(ENOSPC);
       return;
     } else {
-      std::filesystem::remove(log_part(path_, oldest_part_++), ignored);
+      std::filesystem::remove(files_.front(), ignored);
+      files_.pop_front();
     }
   }
 }

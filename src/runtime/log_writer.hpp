@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -60,7 +61,7 @@ class LogWriter {
   std::vector<std::uint8_t> tick_;  // its events, the first `used_` bytes
   std::size_t used_ = 0;
   int part_ = 0;
-  int oldest_part_ = 0;
+  std::deque<std::string> files_;  // of this run, oldest first
   std::int64_t event_number_ = 0;
   std::int64_t file_bytes_ = 0;  // whole ticks, in the kernel
   std::chrono::steady_clock::time_point next_room_check_{};

@@ -19,6 +19,7 @@ def image(root, *arguments):
         (["--ssh-key", "/nonexistent/key.pub"], "/nonexistent/key.pub: no such file"),
         (["--no-login", "--size-mb", "big"], "--size-mb big"),
         (["--no-login", "--card"], "unknown argument '--card'"),
+        (["--no-login", "--output", "/dev/null"], "--output /dev/null: exists and is no file"),
     ],
 )
 def test_bad_usage_is_one_line_before_anything_is_built(root, arguments, complaint):

@@ -3,6 +3,7 @@
 import struct
 import subprocess
 import sys
+import time
 
 import equipoise
 import numpy as np
@@ -180,3 +181,29 @@ def test_what_is_no_log_is_refused_by_name(tmp_path, content, complaint):
     with pytest.raises(UserError, match=complaint) as error:
         read_log(path)
     assert str(path) in str(error.value)
+
+
+def test_false_headers_take_no_longer_than_the_file_is_long(tmp_path):
+    """Each claims 16 MB that are not there: read once for each, 8 MB took two minutes."""
+    path = small_log(tmp_path / "a.lcm")
+    false = struct.pack(">IqqII", 0xEDA1DA01, 0, 0, 16, (1 << 24) - 1)
+    with path.open("ab") as file:
+        file.write(false * 200_000)
+    began = time.process_time()
+    log = read_log(path)
+    assert time.process_time() - began < 20.0
+    assert log["EQUIPOISE_STATE"].size == 20
+
+
+def test_channels_without_end_are_left_out(tmp_path):
+    more = [(f"CHANNEL_{i}", equipoise.state_t().encode()) for i in range(3000)]
+    log = read_log(small_log(tmp_path / "a.lcm", more=more))
+    assert log["EQUIPOISE_STATE"].size == 20 and len(log) == 200
+    assert "more than 200 channels: 2801 messages are left out" in log.notes
+
+
+def test_a_file_that_merely_has_the_name_of_a_part_is_none(tmp_path):
+    data = small_log(tmp_path / "a.lcm").read_bytes()
+    (tmp_path / "a.2024.lcm").write_bytes(data)
+    (tmp_path / "a.0001.lcm").write_text("notes")
+    assert read_log(tmp_path / "a.lcm")["EQUIPOISE_STATE"].size == 20

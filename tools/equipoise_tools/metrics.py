@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from equipoise_robot.errors import UserError
 from equipoise_robot.log import Log
 
 from . import names
@@ -199,7 +200,19 @@ def outcome(summary: Summary) -> str:
     return f"disarmed at the end{why}" if summary.armed_s else f"disarmed all the time{why}"
 
 
+def check_time(log: Log) -> None:
+    """Of a log that nobody vouches for."""
+    for channel in log:
+        if "utime" not in (log[channel].dtype.names or ()):
+            continue
+        utime = log[channel]["utime"]
+        lasts_us = float(utime[-1]) - float(utime[0])
+        if np.any(utime[1:] < utime[:-1]) or lasts_us > 1e15 or (utime.size > 1 and lasts_us == 0.0):
+            raise UserError(f"{log.path}: {channel}: its time stands still, goes back or lasts for 30 years")
+
+
 def summarise(log: Log) -> Summary:
+    check_time(log)
     best = names.TRUTH if names.TRUTH in log else names.STATE
     longest = max((channel for channel in log if channel != names.RUN), key=lambda channel: log[channel].size)
     ended, reasons, fell_at_s = verdict(log)
@@ -215,7 +228,7 @@ def summarise(log: Log) -> Summary:
     if best in log:
         t_s = log.seconds(best)
         settled = t_s >= SETTLE_S
-        if np.count_nonzero(settled) > 1:
+        if np.count_nonzero(settled) > 1 and t_s[-1] > t_s[settled][0]:
             heading, t_s = np.unwrap(log[best]["theta_rad"][:, 2])[settled], t_s[settled]
             summary.yaw_rate_mean_hz = float((heading[-1] - heading[0]) / (t_s[-1] - t_s[0]) / (2 * np.pi))
     if names.MOTORS in log:

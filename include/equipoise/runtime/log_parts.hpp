@@ -16,6 +16,9 @@ int log_part_number(const std::string& path, const std::string& part);
 /// Those that exist, in order; `path` itself need not.
 std::vector<std::string> existing_log_parts(const std::string& path);
 
+/// False for a file that something else has written.
+bool is_log_or_empty(const std::string& path);
+
 /// Logs of this name that were moved aside when a later one took it, oldest first, with all their parts.
 std::vector<std::string> kept_logs(const std::string& path);
 

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "app/cli/commands.hpp"
+#include "app/text/files.hpp"
 #include "config/toml_reader.hpp"
 
 namespace equipoise::app {

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <sstream>
 
+#include "app/text/files.hpp"
 #include "config/nearest.hpp"
 
 namespace equipoise::app {
@@ -177,7 +178,10 @@ Subcommand Subcommand::subcommand(const std::string& name, const std::string& he
 void Subcommand::require_subcommand() const { app_of(impl_)->require_subcommand(1); }
 
 Option Subcommand::option(const std::string& name, std::string& value, const std::string& help) const {
-  return Option(add(impl_, name, value, help));
+  CLI::Option* option = add(impl_, name, value, help);
+  CLI::Validator check([](const std::string& path) { return json_output_error(path); }, std::string{});
+  if (name == "--json") option->check(check);  // before the job, not after it
+  return Option(option);
 }
 Option Subcommand::option(const std::string& name, double& value, const std::string& help) const {
   return Option(add_numbers<double>(impl_, name, value, help));
@@ -243,7 +247,8 @@ int CommandLine::run(int argc, char** argv) {
       what = m.word + (m.word[0] == '-' ? " is no option of " : " is no command of ") + m.where +
              (m.meant.empty() ? "" : "; did you mean " + m.meant + "?");
     }
-    std::fprintf(stderr, "equipoise: %s (%s --help lists what there is)\n", what.c_str(), m.where.c_str());
+    std::fprintf(stderr, "equipoise: %s (%s --help lists what there is)\n", printable(what).c_str(),
+                 m.where.c_str());
     return 2;
   }
 }

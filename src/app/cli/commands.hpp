@@ -35,7 +35,4 @@ void add_completion(Subcommand app);
 void add_man(Subcommand app);
 void add_dbc(Subcommand app);
 
-/// A whole file; InputError names it.
-std::string read_text(const std::string& path);
-
 }  // namespace equipoise::app

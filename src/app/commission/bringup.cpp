@@ -10,6 +10,7 @@
 #include "app/commission/calibrate_wheels.hpp"
 #include "app/commission/commissioning.hpp"
 #include "app/doctor/doctor.hpp"
+#include "app/text/files.hpp"
 #include "app/text/json.hpp"
 
 namespace equipoise::app {

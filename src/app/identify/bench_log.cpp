@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "app/cli/commands.hpp"
+#include "app/text/files.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -9,6 +9,7 @@
 #include "app/log/mcap_writer.hpp"
 #include "app/log/run_log.hpp"
 #include "app/text/json.hpp"
+#include "equipoise/runtime/log_parts.hpp"
 #include "equipoise/runtime/wire.hpp"
 
 namespace equipoise::app {
@@ -219,6 +220,15 @@ int convert(ConvertArguments a) {
   TickRecord first;
   if (!RunLog(a.log).next(&first)) throw InputError(a.log + ": holds no whole tick");
   if (a.out.empty()) a.out = std::filesystem::path(a.log).replace_extension(a.to).string();
+  for (const std::string& part : runtime::existing_log_parts(a.log)) {
+    std::error_code ignored;
+    if (std::filesystem::equivalent(part, a.out, ignored))
+      throw InputError("--out " + a.out + ": is the log itself; choose another name");
+  }
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(a.out, ignored) && std::filesystem::file_size(a.out, ignored) > 0 &&
+      runtime::is_log_or_empty(a.out))
+    throw InputError("--out " + a.out + ": is another log; choose another name");
   std::ofstream file(a.out, std::ios::binary);
   const std::int64_t ticks = a.to == "csv" ? write_csv(a.log, file) : write_mcap(a.log, file);
   if (!file.flush()) throw InputError(a.out + ": cannot be written");

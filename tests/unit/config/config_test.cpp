@@ -54,6 +54,16 @@ class EditedConfig {
   static inline int instances_ = 0;
 };
 
+TEST(Calibration, ASignIsOneOrMinusOne) {
+  for (const char* key : {"encoder_sign", "motor_sign"}) {
+    for (const char* bad : {"0", "0.5", "-0.999"}) {
+      const std::string setting = std::string("calibration.") + key + "=[1, " + bad + ", 1]";
+      EXPECT_THAT(error_of(kMbbr, {setting}), HasSubstr("allowed: 1 or -1")) << setting;
+    }
+    EXPECT_EQ(error_of(kMbbr, {std::string("calibration.") + key + "=[1, -1, 1]"}), "");
+  }
+}
+
 TEST(Config, TheShippedFileLoads) {
   const Loaded<MbbrConfig> loaded = load_mbbr(kMbbr, {});
   EXPECT_EQ(loaded.config.robot.m_t, 0.550);
@@ -149,8 +159,9 @@ TEST(Config, AFileThatIsNestedTooDeepIsRefusedWithItsLine) {
   EXPECT_EQ(error_of(key.path()), key.where() + " more than 100 dots in a line");
   const EditedConfig table("[robot]", "[" + deep + "]\n[robot]");
   EXPECT_EQ(error_of(table.path()), table.where() + " more than 100 dots in a line");
-  const EditedConfig comment("[robot]", "# " + std::string(1000, '.') + "\n[robot]");
-  EXPECT_EQ(error_of(comment.path()), "");
+  // Where a string ends is for the parser to say: an escaped quote must not hide the dots.
+  const EditedConfig quoted("[robot]", "a = \"\\\"\"" + deep + "\n[robot]");
+  EXPECT_EQ(error_of(quoted.path()), quoted.where() + " more than 100 dots in a line");
 }
 
 TEST(Config, APipeOrAFolderIsRefusedAtOnce) {

@@ -19,8 +19,10 @@ using testing::IsEmpty;
 
 class LogParts : public LogFolder {
  protected:
-  std::string file(const std::string& name) const {
-    std::ofstream(folder_ / name) << "x";
+  std::string file(const std::string& name) const { return holding(name, "x"); }
+  std::string part(const std::string& name) const { return holding(name, log_head(9)); }
+  std::string holding(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
     return folder_ / name;
   }
 };
@@ -38,28 +40,38 @@ TEST_F(LogParts, HaveFourDigitsBeforeTheSuffixOrMore) {
 
 TEST_F(LogParts, AreReadInTheOrderOfTheirNumbers) {
   EXPECT_THAT(existing_log_parts(path_), IsEmpty());
-  const std::string ten_thousandth = file("run.10000.lcm");
-  const std::string second = file("run.0002.lcm");
-  const std::string largest = file("run.123456789.lcm");
+  const std::string ten_thousandth = part("run.10000.lcm");
+  const std::string second = part("run.0002.lcm");
+  const std::string largest = part("run.123456789.lcm");
   EXPECT_THAT(existing_log_parts(path_), ElementsAre(second, ten_thousandth, largest));
   file("run.lcm");
   EXPECT_THAT(existing_log_parts(path_), ElementsAre(path_, second, ten_thousandth, largest));
 }
 
 TEST_F(LogParts, OtherFilesAreNone) {
-  for (const char* name : {"run.001.lcm", "run.1234567890.lcm", "run.00x1.lcm", "run.0001.txt",
-                           "runs.0001.lcm", "run.0001.lcm.old", "run..lcm", "run.000/.lcm"})
-    if (std::string(name).find('/') == std::string::npos) file(name);
+  for (const char* name : {"run.001.lcm", "run.00001.lcm", "run.1234567890.lcm", "run.00x1.lcm",
+                           "run.0001.txt", "runs.0001.lcm", "run.0001.lcm.old", "run..lcm", "run.000/.lcm"})
+    if (std::string(name).find('/') == std::string::npos) part(name);
   EXPECT_THAT(existing_log_parts(path_), IsEmpty());
   EXPECT_THAT(kept_logs(path_), IsEmpty());
   EXPECT_THAT(existing_log_parts((folder_ / "none" / "run.lcm").string()), IsEmpty());
 }
 
+TEST_F(LogParts, AFileOfANumberedNameThatDoesNotGoOnWithTheLogIsNone) {
+  file("run.2024.lcm");
+  holding("run.20261122.lcm", log_head(0));  // a log of its own
+  holding("run.0001.lcm", "");
+  fs::create_directory(folder_ / "run.0002.lcm");
+  EXPECT_THAT(existing_log_parts(path_), IsEmpty());
+  file("run.lcm");
+  EXPECT_THAT(existing_log_parts(path_), ElementsAre(path_));
+}
+
 TEST_F(LogParts, ANameThatEndsInDigitsIsNoPartOfItself) {
   const std::string numbered = file("run.2026");
   EXPECT_THAT(existing_log_parts(numbered), ElementsAre(numbered));
-  const std::string part = file("run.0001.2026");
-  EXPECT_THAT(existing_log_parts(numbered), ElementsAre(numbered, part));
+  const std::string further = part("run.0001.2026");
+  EXPECT_THAT(existing_log_parts(numbered), ElementsAre(numbered, further));
 }
 
 TEST_F(LogParts, LogsMovedAsideAreListedOldestFirst) {
@@ -69,7 +81,8 @@ TEST_F(LogParts, LogsMovedAsideAreListedOldestFirst) {
   const std::string second = file("run.20261122T014503Z-2.lcm");
   for (const char* name :
        {"run.20261122 014503Z.lcm", "run.20261122T014503.lcm", "run.2026112T0145030Z.lcm",
-        "run.20261122T01450xZ.lcm", "run.20261122T014503X.lcm", "run.2026112xT014503Z.lcm"})
+        "run.20261122T014503Z-keep-best.lcm", "run.20261122T014503Z.1.lcm", "run.20261122T01450xZ.lcm",
+        "run.20261122T014503X.lcm", "run.2026112xT014503Z.lcm"})
     file(name);
   EXPECT_THAT(kept_logs(path_), testing::UnorderedElementsAre(earlier, later, part, second));
   EXPECT_EQ(kept_logs(path_).front(), earlier);

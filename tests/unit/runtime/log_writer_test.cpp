@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
 #include "equipoise/runtime/log_parts.hpp"
 #include "support/log_event.hpp"
@@ -50,7 +51,7 @@ TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
 TEST_F(LogWriterTest, ALogOfTheSameNameIsReplacedWithAllItsPartsOrKept) {
   for (const char* name :
        {"run.lcm", "run.0001.lcm", "run.12345.lcm", "run.001.lcm", "run.x.lcm", "runs.lcm"})
-    write(name, "old");
+    write(name, log_head(1));
   LogWriter log;
   LogLimits limits;
   limits.keep_previous = true;
@@ -63,7 +64,7 @@ TEST_F(LogWriterTest, ALogOfTheSameNameIsReplacedWithAllItsPartsOrKept) {
   EXPECT_TRUE(fs::exists(folder_ / "run.x.lcm") && fs::exists(folder_ / "run.001.lcm"));
   log.close();
 
-  write("run.0001.lcm", "old");
+  write("run.0001.lcm", log_head(1));
   LogWriter again;
   ASSERT_TRUE(again.open(path_, {}));
   EXPECT_THAT(existing_log_parts(path_), ElementsAre(path_));
@@ -72,14 +73,14 @@ TEST_F(LogWriterTest, ALogOfTheSameNameIsReplacedWithAllItsPartsOrKept) {
 }
 
 TEST_F(LogWriterTest, ALogWhoseFurtherPartSomebodyWritesIsNotTaken) {
-  write("run.lcm", "first");
-  write("run.0001.lcm", "second");
+  write("run.lcm", log_head(0));
+  write("run.0001.lcm", log_head(1));
   const int writer = open((folder_ / "run.0001.lcm").c_str(), O_WRONLY);
   ASSERT_EQ(flock(writer, LOCK_EX | LOCK_NB), 0);
   LogWriter log;
   EXPECT_FALSE(log.open(path_, {}));
   EXPECT_THAT(log.error(), HasSubstr("another process is writing it"));
-  EXPECT_EQ(fs::file_size(path_), 5U);
+  EXPECT_EQ(fs::file_size(path_), 12U);
   close(writer);
   LogWriter free;
   EXPECT_TRUE(free.open(path_, {}));
@@ -157,7 +158,7 @@ TEST_F(LogWriterTest, AKeptLogIsNamedAfterTheEndOfItsLastPart) {
   constexpr timespec kEnds[] = {{1795311000, 0}, {1795311903, 0}};  // the second: 2026-11-22 01:45:03 UTC
   int part = 0;
   for (const char* name : {"run.lcm", "run.0001.lcm"}) {
-    write(name, "old");
+    write(name, log_head(1));
     const timespec times[] = {kEnds[part], kEnds[part]};
     ASSERT_EQ(utimensat(AT_FDCWD, (folder_ / name).c_str(), times, 0), 0);
     ++part;
@@ -203,16 +204,67 @@ TEST_F(LogWriterTest, AFileIsFullWhenItHasReachedItsSize) {
   EXPECT_EQ(existing_log_parts(path_).size(), 3U) << "the next is begun at once";
 }
 
-TEST_F(LogWriterTest, AFurtherPartThatExistsIsNotOverwritten) {
+TEST_F(LogWriterTest, AFurtherPartThatExistsIsNeitherOverwrittenNorInTheWay) {
   LogWriter log;
   LogLimits limits;
   limits.max_bytes = 200;
   ASSERT_TRUE(log.open(path_, limits));
   write("run.0001.lcm", "somebody's");
   write_tick(&log);
-  EXPECT_FALSE(log.is_open());
-  EXPECT_THAT(log.error(), HasSubstr("run.0001.lcm: log cannot be created: File exists"));
+  EXPECT_TRUE(log.is_open()) << log.error();
   EXPECT_EQ(fs::file_size(log_part(path_, 1)), 10U);
+  EXPECT_EQ(fs::file_size(log_part(path_, 2)), 28U) << "the empty preamble";
+}
+
+TEST_F(LogWriterTest, WhatIsNoLogIsNotReplaced) {
+  for (const bool keep : {false, true}) {
+    write("run.lcm", "[robot]\n");
+    LogWriter log;
+    LogLimits limits;
+    limits.keep_previous = keep;
+    EXPECT_FALSE(log.open(path_, limits));
+    EXPECT_THAT(log.error(), HasSubstr("exists and is no log"));
+    EXPECT_EQ(fs::file_size(path_), 8U);
+  }
+}
+
+TEST_F(LogWriterTest, ALogOfOneNameLeavesLogsOfOthersAlone) {
+  write("run.20261122.lcm", log_head(0));
+  write("run.2024.lcm", "notes");
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {}));
+  EXPECT_TRUE(fs::exists(folder_ / "run.20261122.lcm") && fs::exists(folder_ / "run.2024.lcm"));
+}
+
+TEST_F(LogWriterTest, ShortOfSpaceItDeletesOnlyWhatItWrote) {
+  write("run.20261122T014503Z.lcm", log_head(0));
+  write("run.20261122T014503Z-keep-best.lcm", log_head(0));
+  LogWriter log;
+  LogLimits limits;
+  limits.max_bytes = 200;
+  ASSERT_TRUE(log.open(path_, limits));
+  write("run.0001.lcm", "somebody's");
+  write_tick(&log);  // goes on in part 2
+  log.close();
+  limits.min_free_bytes = std::numeric_limits<std::int64_t>::max();
+  limits.max_bytes = 0;
+  LogWriter short_of_space;
+  limits.keep_previous = true;
+  ASSERT_TRUE(short_of_space.open(path_, limits));
+  write_tick(&short_of_space);
+  EXPECT_THAT(short_of_space.error(), HasSubstr("No space"));
+  EXPECT_TRUE(fs::exists(folder_ / "run.20261122T014503Z-keep-best.lcm"));
+  EXPECT_FALSE(fs::exists(folder_ / "run.20261122T014503Z.lcm"));
+  EXPECT_EQ(fs::file_size(log_part(path_, 1)), 10U);
+}
+
+TEST_F(LogWriterTest, ALogThatIsDeletedWhileItIsWrittenIsNoSuccess) {
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {}));
+  write_tick(&log);
+  fs::remove(path_);
+  log.close();
+  EXPECT_THAT(log.error(), HasSubstr("run.lcm: the log was deleted while it was written"));
 }
 
 TEST_F(LogWriterTest, LeavesNoDescriptorOpen) {
@@ -234,7 +286,7 @@ TEST_F(LogWriterTest, LeavesNoDescriptorOpen) {
 }
 
 TEST_F(LogWriterTest, DescriptorZeroIsOneLikeAnyOther) {
-  write("run.lcm", "of an earlier run");
+  write("run.lcm", log_head(0) + "of an earlier run");
   const int kept = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
   close(STDIN_FILENO);
   LogWriter log;

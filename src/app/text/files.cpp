@@ -1,0 +1,64 @@
+#include "app/text/files.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "app/text/errors.hpp"
+
+namespace equipoise::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Nobody at the other end of a named pipe: opening it would wait for ever.
+bool is_unread_pipe(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_fifo(path, error)) return false;
+  const int fd = open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+  if (fd >= 0) close(fd);
+  return fd < 0;
+}
+
+}  // namespace
+
+/// A pipe, a terminal or a device might never end; a shell's pipe is named under /dev or /proc.
+std::string read_text(const std::string& path) {
+  std::error_code error;
+  const fs::file_type type = fs::status(path, error).type();
+  const bool shells_pipe =
+      type == fs::file_type::fifo && (path.rfind("/dev/", 0) == 0 || path.rfind("/proc/", 0) == 0);
+  if (type != fs::file_type::regular && type != fs::file_type::not_found && !shells_pipe)
+    throw InputError(path + ": cannot be read: no regular file");
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (!file || (file.peek() != EOF && !(text << file.rdbuf()))) throw InputError(path + ": cannot be read");
+  return text.str();
+}
+
+std::string json_output_error(const std::string& path) {
+  if (path == "-") return "";
+  if (is_unread_pipe(path)) return path + ": is a pipe that nobody reads";
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return "";
+  std::ifstream file(path, std::ios::binary);
+  file >> std::ws;
+  const int first = file.peek();
+  if (first == EOF || first == '{' || first == '[') return "";
+  return path + ": exists and holds no JSON; choose another name";
+}
+
+std::string printable(const std::string& text) {
+  std::string out = text;
+  std::replace_if(
+      out.begin(), out.end(),
+      [](unsigned char c) { return (c < 0x20 && c != '\n' && c != '\t') || c == 0x7F; }, '?');
+  return out;
+}
+
+}  // namespace equipoise::app

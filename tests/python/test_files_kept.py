@@ -1,0 +1,145 @@
+"""What users have is not overwritten, and what is no file is not waited for."""
+
+import os
+import shutil
+import subprocess
+
+import pytest
+from equipoise_robot.errors import UserError
+from equipoise_robot.log import read_log
+
+PATIENCE_S = 60
+
+
+@pytest.fixture
+def log(do, root, tmp_path):
+    config = str(root / "config/edumip.toml")
+    do("sim", "--config", config, "--duration-s", "1", "--log", "x.lcm", status=0)
+    return tmp_path / "x.lcm"
+
+
+@pytest.fixture
+def do(root, tmp_path):
+    def run(*arguments, status):
+        command = [root / "build/host/equipoise", *arguments]
+        done = subprocess.run(
+            list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE_S, cwd=tmp_path
+        )
+        assert done.returncode == status, done.stderr
+        return done.stderr
+
+    return run
+
+
+def test_a_log_is_not_converted_onto_itself(do, log, tmp_path):
+    before = log.read_bytes()
+    (tmp_path / "link.csv").symlink_to(log)
+    shutil.copy(log, tmp_path / "y.csv")
+    for arguments in (
+        ["x.lcm", "--to", "csv", "--out", "x.lcm"],
+        ["x.lcm", "--to", "mcap", "--out", "link.csv"],
+        ["y.csv", "--to", "csv"],  # its default name
+    ):
+        assert "is the log itself" in do("convert", *arguments, status=2)
+    assert "is another log" in do("convert", "x.lcm", "--to", "csv", "--out", "y.csv", status=2)
+    assert log.read_bytes() == before and (tmp_path / "y.csv").read_bytes() == before
+
+
+def test_json_replaces_json_only(do, log, root, tmp_path):
+    before = log.read_bytes()
+    shutil.copy(root / "config/edumip.toml", tmp_path / "robot.toml")
+    sim = ["sim", "--config", "robot.toml", "--duration-s", "1", "--log", "off", "--json"]
+    assert "holds no JSON" in do("replay", "x.lcm", "--json", "x.lcm", status=2)
+    assert "holds no JSON" in do(*sim, "robot.toml", status=2)
+    assert log.read_bytes() == before
+    do(*sim, "out.json", status=0)
+    do(*sim, "out.json", status=0)
+
+
+def test_a_log_of_one_name_leaves_the_others(do, root, tmp_path, known_log):
+    config = root / "config/edumip.toml"
+    for name in ("x.20261122.lcm", "x.2024.lcm"):
+        shutil.copy(known_log, tmp_path / name)
+    (tmp_path / "thesis.2024.txt").write_text("chapter 1")
+    shutil.copy(config, tmp_path / "robot.toml")
+    (tmp_path / "x.00001.lcm").write_text("stray")
+    kept = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    sim = ["sim", "--config", str(config), "--duration-s", "1", "--log"]
+    do(*sim, "x.lcm", status=0)
+    do(*sim, "thesis.txt", status=0)
+    assert "exists and is no log" in do(*sim, "robot.toml", status=1)
+    run = ["run", "--backend", "sim", "--telemetry", "off", "--config", str(config), "--duration-s", "1"]
+    assert "exists and is no log" in do(*run, "--log", "robot.toml", status=1)
+    assert {name: (tmp_path / name).read_bytes() for name in kept} == kept
+
+
+def test_an_earlier_log_of_the_same_name_is_kept(do, root, tmp_path):
+    run = ["run", "--backend", "sim", "--telemetry", "off", "--speed", "100", "--duration-s", "1"]
+    for _ in range(2):
+        do(*run, "--config", str(root / "config/edumip.toml"), "--log", "x.lcm", status=0)
+    assert len(list(tmp_path.glob("x.*T*Z.lcm"))) == 1 and (tmp_path / "x.lcm").exists()
+
+
+def test_a_log_that_is_deleted_in_flight_is_no_success(root, tmp_path):
+    command = [root / "build/host/equipoise", "run", "--config", root / "config/edumip.toml"]
+    command += ["--backend", "sim", "--telemetry", "off", "--duration-s", "2", "--log", tmp_path / "x.lcm"]
+    with subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True) as run:
+        while not (tmp_path / "x.lcm").exists():
+            assert run.poll() is None
+        (tmp_path / "x.lcm").unlink()
+        assert "was deleted while it was written" in run.stderr.read()
+    assert run.returncode == 1
+
+
+def test_a_name_that_is_not_utf8_has_its_result(root, tmp_path):
+    name = os.path.join(os.fsencode(tmp_path), b"\xff.lcm")
+    command = [
+        root / "build/host/equipoise",
+        "run",
+        "--config",
+        root / "config/edumip.toml",
+        "--backend",
+        "sim",
+    ]
+    command += ["--telemetry", "off", "--speed", "100", "--duration-s", "2", "--json", "-", "--log", name]
+    done = subprocess.run(command, capture_output=True, timeout=PATIENCE_S)
+    assert done.returncode == 0 and b'"ended": "finished"' in done.stdout
+
+
+def test_nothing_waits_for_a_pipe(do, root, tmp_path):
+    config = root / "config/edumip.toml"
+    for name in ("pipe", "pipe.lcm"):
+        os.mkfifo(tmp_path / name, 0o600)
+    sim = ["sim", "--config", str(config), "--duration-s", "1", "--log"]
+    assert "nobody reads" in do(*sim, "off", "--json", "pipe", status=2)
+    assert "no regular file" in do("model", "--robot", "mip", "--in", "pipe", "--json", "-", status=2)
+    assert "is no file" in do("send", "--key", "pipe", "--arm", status=2)
+    assert "no regular file" in do(*sim, "off", "--path", "pipe", status=2)
+    assert "is a pipe" in do(*sim, "pipe.lcm", status=1)
+    for name in (tmp_path / "pipe.lcm", "/dev/zero"):
+        with pytest.raises(UserError, match="is no regular file"):
+            read_log(name)
+
+
+def test_dots_without_end_are_refused(do, root, tmp_path):
+    text = (root / "config/edumip.toml").read_text()
+    attack = 'a = "\\""' + ".a" * 200_000 + "\n"
+    (tmp_path / "deep.toml").write_text(attack + text)
+    sim = ["sim", "--duration-s", "1", "--log", "off", "--config"]
+    assert "dots in a line" in do(*sim, "deep.toml", status=2)
+
+
+@pytest.mark.parametrize(
+    "key", ["population.actual.boddy_mass_scale", "population.disturbance.static_ration", "population.typo"]
+)
+def test_a_table_that_is_not_needed_is_checked_all_the_same(do, root, tmp_path, key):
+    table, _, name = key.rpartition(".")
+    text = (root / "config/edumip.toml").read_text()
+    text = text.replace(f"[{table}]\n", f"[{table}]\n{name} = [0.9, 1.1]\n", 1)
+    (tmp_path / "robot.toml").write_text(text)
+    assert key in do("sim", "--config", "robot.toml", "--duration-s", "1", "--log", "off", status=2)
+
+
+def test_what_a_terminal_would_obey_is_not_printed(do):
+    assert "\x1b" not in do("sim", "--config", "\x1b]0;title\x07", status=2)
+    assert "\x1b" not in do("sim\x1b[2J", status=2)
