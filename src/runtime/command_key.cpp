@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <sstream>
 #include <stdexcept>
 
@@ -54,15 +56,16 @@ CommandKey from_hex(const std::string& path, const std::string& hex) {
   return key;
 }
 
-std::string private_text(const std::string& path) {
-  const File file{open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+/// `any_owner`: of root, who renews the key of the robot's user.
+std::string private_text(const std::string& path, bool any_owner = false) {
+  const File file{open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};  // a pipe is not waited for
   struct stat about {};
   if (file.fd < 0 || fstat(file.fd, &about) != 0)
     throw std::runtime_error(path + ": " + std::strerror(errno) + "; make a key with equipoise keygen");
   if (!S_ISREG(about.st_mode)) throw std::runtime_error(path + ": is no file");
   if ((about.st_mode & 077U) != 0)
     throw std::runtime_error(path + ": others may read or write this key; chmod 600 " + path);
-  if (about.st_uid != geteuid() && about.st_uid != 0)
+  if (about.st_uid != geteuid() && about.st_uid != 0 && !(any_owner && geteuid() == 0))
     throw std::runtime_error(path + ": belongs to another user; chown it to the one who runs this");
   std::string text(kLongestFile, '\0');
   const ssize_t size = read(file.fd, text.data(), text.size());
@@ -71,13 +74,17 @@ std::string private_text(const std::string& path) {
 }
 
 /// Wipes the text.
+bool write_all(int fd, std::string&& text) {
+  const bool written =
+      write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && fsync(fd) == 0;
+  sodium_memzero(text.data(), text.size());
+  return written;
+}
+
 void write_private(const std::string& path, std::string&& text) {
   const File file{open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
   if (file.fd < 0) throw std::runtime_error(path + ": " + std::strerror(errno));
-  const bool written =
-      write(file.fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && fsync(file.fd) == 0;
-  sodium_memzero(text.data(), text.size());
-  if (written) return;
+  if (write_all(file.fd, std::move(text))) return;
   unlink(path.c_str());
   throw std::runtime_error(path + ": cannot be written");
 }
@@ -150,7 +157,11 @@ CommandKey CommandKeys::commands(const std::string& holder) const {
 
 CommandKeys CommandKeys::load(const std::string& path) {
   need_sodium();
-  std::istringstream in(private_text(path));
+  return read(path, private_text(path));
+}
+
+CommandKeys CommandKeys::read(const std::string& path, const std::string& text) {
+  std::istringstream in(text);
   std::string magic;
   std::string kind;
   std::string robot;
@@ -181,14 +192,22 @@ void CommandKeys::create(const std::string& path, const std::string& robot) {
   of_robot(robot, random_key()).save(path);
 }
 
-void CommandKeys::rotate(const std::string& path) {
-  const CommandKeys old = load(path);
+/// The file itself, not a link to it; its owner keeps it.
+void CommandKeys::rotate(const std::string& link) {
+  need_sodium();
+  const CommandKeys old = read(link, private_text(link, true));
   if (!old.holder_.empty())
-    throw std::runtime_error(path + ": is " + old.holder_ + "'s; the robot's own key is rotated");
-  const std::string fresh = path + ".new";
-  unlink(fresh.c_str());  // of a rotation that was interrupted
-  create(fresh, old.robot_);
-  if (std::rename(fresh.c_str(), path.c_str()) == 0) return;
+    throw std::runtime_error(link + ": is " + old.holder_ + "'s; the robot's own key is rotated");
+  const std::string path = std::filesystem::canonical(link).string();
+  struct stat about {};
+  std::string fresh = path + ".XXXXXX";
+  const File file{mkostemp(fresh.data(), O_CLOEXEC)};  // for its owner only
+  if (file.fd < 0) throw std::runtime_error(fresh + ": " + std::strerror(errno));
+  const bool done = stat(path.c_str(), &about) == 0 &&
+                    write_all(file.fd, of_robot(old.robot_, random_key()).text()) &&
+                    (geteuid() != 0 || fchown(file.fd, about.st_uid, about.st_gid) == 0) &&
+                    std::rename(fresh.c_str(), path.c_str()) == 0;
+  if (done) return;
   const int error = errno;
   unlink(fresh.c_str());
   throw std::runtime_error(path + ": " + std::strerror(error));

@@ -44,6 +44,7 @@ class CommandKeys {
   /// New secret in a new file of its owner's; throws if the file exists.
   static void create(const std::string& path, const std::string& robot);
   /// New secret in the place of the robot's old one: what its holders have is worthless at its next start.
+  /// Root renews anybody's.
   static void rotate(const std::string& path);
   void save(const std::string& path) const;  // as create()
 
@@ -61,6 +62,7 @@ class CommandKeys {
         secret_(secret),
         announcements_(announcements) {}
   std::string text() const;
+  static CommandKeys read(const std::string& path, const std::string& text);
 
   std::string robot_;
   std::string holder_;

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <set>
 #include <stdexcept>
@@ -161,12 +162,41 @@ TEST_F(KeyFile, ThatCannotBeWrittenIsNotLeftBehind) {
   EXPECT_NE(access(path_.c_str(), F_OK), 0);
 }
 
-TEST_F(KeyFile, ARotationThatWasInterruptedIsNoHindrance) {
+TEST_F(KeyFile, ARotationLeavesOtherFilesAlone) {
   CommandKeys::create(path_, "mbbr");
-  std::ofstream(path_ + ".new") << "half a key";
+  std::ofstream(path_ + ".new") << "somebody's";
   CommandKeys::rotate(path_);
   EXPECT_EQ(complaint(), "loaded");
-  EXPECT_NE(access((path_ + ".new").c_str(), F_OK), 0);
+  EXPECT_EQ(access((path_ + ".new").c_str(), F_OK), 0);
+  unlink((path_ + ".new").c_str());
+}
+
+TEST_F(KeyFile, ARotationThroughALinkRenewsTheFile) {
+  const std::string link = path_ + ".link";
+  CommandKeys::create(path_, "mbbr");
+  const CommandKeys old = CommandKeys::load(path_);
+  ASSERT_EQ(symlink(path_.c_str(), link.c_str()), 0);
+  CommandKeys::rotate(link);
+  EXPECT_FALSE(convinces(old, CommandKeys::load(path_), "anna"));
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  unlink(link.c_str());
+}
+
+TEST_F(KeyFile, OfTheRobotsUserIsRenewedByRoot) {
+  CommandKeys::create(path_, "mbbr");
+  if (chown(path_.c_str(), 12345, 12346) != 0) GTEST_SKIP() << "needs root";
+  CommandKeys::rotate(path_);
+  struct stat about {};
+  ASSERT_EQ(stat(path_.c_str(), &about), 0);
+  EXPECT_EQ(about.st_uid, 12345U);
+  EXPECT_EQ(about.st_gid, 12346U);
+  EXPECT_EQ(about.st_mode & 0777U, 0600U);
+}
+
+TEST_F(KeyFile, APipeIsNotWaitedFor) {
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  EXPECT_NE(complaint().find("is no file"), std::string::npos);
+  unlink(path_.c_str());
 }
 
 TEST_F(KeyFile, ARotationThatFailsLeavesTheOldKeyAndNoOther) {
@@ -180,7 +210,10 @@ TEST_F(KeyFile, ARotationThatFailsLeavesTheOldKeyAndNoOther) {
     text = error.what();
   }
   EXPECT_EQ(text, path_ + ": Input/output error");
-  EXPECT_NE(access((path_ + ".new").c_str(), F_OK), 0) << "a key that nobody knows of";
+  const auto beside = std::filesystem::directory_iterator(std::filesystem::path(path_).parent_path());
+  for (const auto& entry : beside)
+    EXPECT_NE(entry.path().string().rfind(path_ + ".", 0), 0U)
+        << "a key that nobody knows of: " << entry.path();
   EXPECT_TRUE(convinces(old, CommandKeys::load(path_), "anna"));
 }
 
