@@ -44,11 +44,9 @@ void CommandReceiver::receive(const std::uint8_t* data, std::size_t size) {
   if (message.decode(data, 0, length) != length) return;
   const CommandGate::Verdict verdict = gate_.accept(message, static_cast<std::int64_t>(now_ms()));
   if (verdict == CommandGate::Verdict::kRefused) return;  // no answer for whoever repeats what was said
-  if (verdict == CommandGate::Verdict::kObeyed) {
-    wish_.put(gate_.wish());
-    note(message);
-  }
+  if (verdict == CommandGate::Verdict::kObeyed) wish_.put(gate_.wish());
   announce(message.sender);
+  if (verdict == CommandGate::Verdict::kObeyed) note(message);
 }
 
 void CommandReceiver::announce(std::int64_t to) {

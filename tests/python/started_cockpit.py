@@ -1,6 +1,8 @@
 """A cockpit as tools/cockpit starts it, for the tests that talk to it."""
 
 import asyncio
+import contextlib
+import json
 import os
 import re
 import signal
@@ -11,6 +13,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import WebSocketClosedError, websocket_connect
 
 PATIENCE_S = float(
     os.environ.get("COCKPIT_PATIENCE_S", "60")
@@ -64,3 +68,25 @@ class Started:
     def end(self) -> None:
         self.process.send_signal(signal.SIGINT)
         assert self.process.wait(PATIENCE_S) == 0, self.process.stderr.read()
+
+
+async def talk(cockpit, requests, *, host=None, origin=None, token=None, answers=1, error=None):
+    """What a WebSocket client is told: events, or the code it was closed or refused with. As many as
+    `answers`, or until one has `error` in its words: others come on their own, in between."""
+    headers = {"Host": host or cockpit.host} | ({"Origin": origin} if origin else {})
+    try:
+        socket = await websocket_connect(HTTPRequest(f"ws://{cockpit.host}/socket", headers=headers))
+    except HTTPClientError as error:
+        return error.code
+    with contextlib.suppress(WebSocketClosedError):
+        for request in [{"do": "hello", "token": token}] * (token is not None) + requests:
+            await socket.write_message(json.dumps(request))
+    events = []
+    while len(events) < answers if error is None else not any(error in e.get("error", "") for e in events):
+        message = await asyncio.wait_for(socket.read_message(), PATIENCE_S)
+        if message is None:
+            return socket.close_code
+        if isinstance(message, str) and "beat" not in json.loads(message):
+            events.append(json.loads(message))
+    socket.close()
+    return events

@@ -1,7 +1,6 @@
 """The cockpit as others meet it: strangers on its port, a robot that is attached, its processes and parts."""
 
 import asyncio
-import contextlib
 import json
 import os
 import re
@@ -16,9 +15,9 @@ from equipoise_tools.cockpit import frames, words
 from equipoise_tools.cockpit.playback import Playback
 from equipoise_tools.cockpit.robot import private_url
 from equipoise_tools.cockpit.server import QUEUE, Page
-from started_cockpit import PATIENCE_S, Started, in_a_loop, until
+from started_cockpit import PATIENCE_S, Started, in_a_loop, talk, until
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
-from tornado.websocket import WebSocketClosedError, websocket_connect
+from tornado.websocket import websocket_connect
 
 pytestmark = pytest.mark.usefixtures("multicast")
 
@@ -26,28 +25,6 @@ pytestmark = pytest.mark.usefixtures("multicast")
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("logs")
-
-
-async def talk(cockpit, requests, *, host=None, origin=None, token=None, answers=1, error=None):
-    """What a WebSocket client is told: events, or the code it was closed or refused with. As many as
-    `answers`, or until one has `error` in its words: others come on their own, in between."""
-    headers = {"Host": host or cockpit.host} | ({"Origin": origin} if origin else {})
-    try:
-        socket = await websocket_connect(HTTPRequest(f"ws://{cockpit.host}/socket", headers=headers))
-    except HTTPClientError as error:
-        return error.code
-    with contextlib.suppress(WebSocketClosedError):
-        for request in [{"do": "hello", "token": token}] * (token is not None) + requests:
-            await socket.write_message(json.dumps(request))
-    events = []
-    while len(events) < answers if error is None else not any(error in e.get("error", "") for e in events):
-        message = await asyncio.wait_for(socket.read_message(), PATIENCE_S)
-        if message is None:
-            return socket.close_code
-        if isinstance(message, str):
-            events.append(json.loads(message))
-    socket.close()
-    return events
 
 
 @pytest.mark.parametrize(

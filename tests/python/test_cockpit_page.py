@@ -144,9 +144,29 @@ def test_a_gamepad_drives_and_disarms(page, cockpit):
     page.goto(cockpit.link)
     until(lambda: heard(page), "the page hears the robot")
     assert text(page, "#gamepad") == "pad"
+    page.evaluate(
+        "pad.axes[1] = -1"
+    )  # pushed already when the robot is armed: nothing moves before it is let go
     take_and_arm(page)
+    stays_still(page, lambda: None)
+    page.evaluate("pad.axes[1] = 0")
+    page.wait_for_timeout(200)
     page.evaluate("pad.axes[1] = -1")
     until(lambda: asked_speed(page) > 0.1, "the left stick drives")
+    page.evaluate("dispatchEvent(new Event('blur'))")
+    until(lambda: asked_speed(page) == 0, "who looks elsewhere does not drive")
+    stays_still(page, lambda: None)  # the stick is still pushed
+    page.evaluate("pad.axes[1] = 0")
+    page.wait_for_timeout(200)
+    page.evaluate("Object.defineProperty(document, 'hidden', {get: () => window.away, configurable: true})")
+    page.evaluate("window.away = true; pad.axes[1] = -1")
+    stays_still(page, lambda: None)
+    page.evaluate("window.away = false")
+    stays_still(page, lambda: None)
+    page.evaluate("pad.axes[1] = 0")
+    page.wait_for_timeout(200)
+    page.evaluate("pad.axes[1] = -1")
+    until(lambda: asked_speed(page) > 0.1, "let go and pushed again it drives")
     page.evaluate("pad.axes[1] = 0.05")
     until(lambda: asked_speed(page) == 0, "a stick that is almost centred asks for nothing")
     page.evaluate("pad.axes[1] = -1")

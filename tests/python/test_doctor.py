@@ -60,7 +60,7 @@ def device(root: Path, bus: str, path: str, attributes: dict[str, str]) -> None:
 
 def thread(root: Path, number: int, name: str, priority: int) -> None:
     write(root / f"proc/{number}/comm", f"{name}\n")
-    write(root / f"proc/{number}/stat", f"{number} ({name}) S " + "0 " * 36 + f"{priority} 1 0\n")
+    write(root / f"proc/{number}/stat", f"{number} ({name}) S " + "0 " * 35 + f"1 {priority} 1 0\n")
 
 
 def owners(root: Path, names: dict[int, str]) -> None:
@@ -292,7 +292,8 @@ def test_a_pad_that_belongs_to_somebody_else_is_found(root, robot):
 
 
 def test_interrupts_of_the_sample_come_first(root, robot):
-    assert examine(root, robot)[0]["kernel.irq_threads"]["verdict"] == "ok"
+    found = examine(root, robot)[0]["kernel.irq_threads"]
+    assert found["verdict"] == "ok" and "GPIO at 70, Ethernet and MMC at 50" in found["what"]
     thread(robot, 51, "irq/44-481ae000.gpio", 50)
     found = examine(root, robot)[0]["kernel.irq_threads"]
     assert found["verdict"] == "warn" and "481ae000" in found["what"] and "real-time-machine" in found["fix"]

@@ -94,6 +94,19 @@ def test_an_external_engine_keeps_the_robot_upright_and_drives_it(root, tmp_path
     whole(firmware.log, 2000)
 
 
+def test_a_calibrated_bias_is_neither_lost_nor_doubled(root, tmp_path):
+    """The engine's gyro is true: after the firmware's own calibration it is what the engine said."""
+    firmware = Firmware(
+        root, tmp_path, "--no-arm", "--set", "calibration.gyro_bias_rad_s=[0.03, -0.02, 0.01]"
+    )
+    with firmware.connect() as connection:
+        for number in range(20):
+            step(connection, Robot(0.0), number, last=number == 19, gyro_B_rad_s=[0.1, 0.2, 0.3])
+    firmware.process.communicate(timeout=60)
+    gyro = read_log(firmware.log).sensors()["gyro_B_rad_s"]
+    assert gyro[-1].tolist() == pytest.approx([0.1, 0.2, 0.3], abs=0.002)
+
+
 def test_duration_ends_the_run_with_last_and_motors_off(root, tmp_path):
     firmware = Firmware(root, tmp_path, "--duration-s", "2")
     with firmware.connect() as connection:

@@ -20,7 +20,7 @@ namespace equipoise::runtime {
 struct CommandReceiverOptions {
   std::string robot;  // its name; empty: as in the keys
   double timeout_s = 0.5;
-  /// Told on the receiver's thread who began which turn.
+  /// Told on the receiver's thread, which must not be held up, who began which turn.
   std::function<void(const std::string& what)> journal;
 };
 

@@ -1,5 +1,11 @@
 #include "app/run/conversation.hpp"
 
+#include <unistd.h>
+
+#include <ctime>
+#include <fstream>
+#include <sstream>
+
 #include "app/cli/interrupt.hpp"
 #include "app/cli/key_file.hpp"
 #include "app/run/wires.hpp"
@@ -13,10 +19,29 @@ Clock::time_point after(double seconds) {
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
+/// When somebody asked for this process.
+Clock::time_point process_start() {
+  std::ifstream file("/proc/self/stat");
+  std::string text;
+  std::getline(file, text);
+  std::istringstream fields(text.substr(std::min(text.rfind(')') + 1, text.size())));
+  std::string field;
+  constexpr int kStartTime = 20;  // the 22nd of all, in clock ticks since the machine's start
+  for (int i = 0; i < kStartTime; ++i) fields >> field;
+  timespec up{};
+  if (!fields || clock_gettime(CLOCK_BOOTTIME, &up) != 0) return Clock::now();
+  const double age_s = static_cast<double>(up.tv_sec) + 1e-9 * static_cast<double>(up.tv_nsec) -
+                       std::stod(field) / static_cast<double>(sysconf(_SC_CLK_TCK));
+  return after(-age_s);
+}
+
 }  // namespace
 
 Conversation::Conversation(const SendArguments& a, const runtime::CommandKeys& keys)
     : a_(a),
+      awake_(process_start() +
+             std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                 std::max(0.0, a.timeout_s - kStopped_s)))),  // a busy machine starts it late
       sender_(as_input([&] { return runtime::CommandSender(keys, a.robot, a.holder); })),
       robot_(a.robot.empty() ? keys.robot() : a.robot),
       wire_(open_wire(a.url, runtime::WireSide::kOwner)) {}
@@ -25,11 +50,13 @@ void Conversation::listen(double seconds) {
   constexpr int kPatience_ms = 10;
   const auto end = after(seconds);
   do {
+    note_awake();
     wire_->listen(kPatience_ms, [this](const std::uint8_t* data, std::size_t size) {
       command_session_t heard;
       const auto length = static_cast<int>(size);
       if (heard.decode(data, 0, length) == length) sender_.hear(heard);
     });
+    note_awake();
     while (const auto question = sender_.ask()) say(*question);
   } while (Clock::now() < end && !interrupted.load());
 }
@@ -50,6 +77,20 @@ void Conversation::find_robots() {
                              ": give each its own (equipoise run --robot-name, or keygen)");
 }
 
+void Conversation::note_awake() {
+  const auto now = Clock::now();
+  stopped_s_ = std::max(stopped_s_, std::chrono::duration<double>(now - awake_).count());
+  awake_ = now;
+}
+
+void Conversation::refuse_if_late(std::int8_t action) const {
+  if (action == signed_command_t::DISARM || stopped_s_ <= kStopped_s) return;
+  std::ostringstream text;
+  text.precision(2);
+  text << "this command was stopped for " << stopped_s_ << " s; it would come too late: give it again";
+  throw std::runtime_error(text.str());
+}
+
 /// One arm, disarm or heading reset of the turn that is now, repeated until the robot has begun the next.
 /// False: somebody else was faster.
 bool Conversation::begin_turn(Link* link, std::int8_t action) {
@@ -57,6 +98,9 @@ bool Conversation::begin_turn(Link* link, std::int8_t action) {
   const std::int64_t first = link->signed_up_to + 1;
   for (const auto limit = after(a_.timeout_s); link->turn == turn;) {
     if (Clock::now() > limit || interrupted.load()) fail("confirms nothing");
+    listen(0.0);
+    refuse_if_late(action);
+    if (link->turn != turn) break;
     say(sender_.sign(link, turn, action));
     for (const auto next = after(wire_->interval_s()); Clock::now() < next && link->turn == turn;)
       listen(0.0);
@@ -105,6 +149,7 @@ std::int64_t Conversation::drive() {
   auto silent = after(a_.timeout_s);
   for (std::int64_t sent = 1;; ++sent) {
     const std::int64_t confirmed = robot().confirmed;
+    refuse_if_late(signed_command_t::DRIVE);
     say(sender_.sign(&robot(), turn, signed_command_t::DRIVE, motion));
     listen(wire_->interval_s());
     const bool last = Clock::now() >= end || interrupted.load();

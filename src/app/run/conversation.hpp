@@ -51,15 +51,22 @@ class Conversation {
   bool begin_turn(Link* link, std::int8_t action);
   Link& robot() { return sender_.links().front(); }
   bool confirms_more() { return robot().confirmed < robot().signed_up_to; }
+  void note_awake();
+  void refuse_if_late(std::int8_t action) const;
   [[noreturn]] void fail(const std::string& what) const { throw std::runtime_error(robot_ + " " + what); }
   std::string overtaken(const Link& link) const {
     return (link.turn_holder.empty() ? "somebody" : link.turn_holder) + " has taken over";
   }
 
+  /// Twice the command_timeout_s that robots are shipped with. Who was stopped for longer, a terminal's
+  /// Ctrl-Z or a suspended machine, does not know any more what is wanted of it, but for a disarm.
+  static constexpr double kStopped_s = 1.0;
   static constexpr double kAnswer_s = 0.5;   // on the slowest wire
   static constexpr double kOthers_s = 0.25;  // for every robot there to have answered
 
   const SendArguments& a_;
+  Clock::time_point awake_;  // last known to run; at first, when the process was started
+  double stopped_s_ = 0.0;   // the longest that it was not
   runtime::CommandSender sender_;
   std::string robot_;
   std::unique_ptr<runtime::CommandWire> wire_;

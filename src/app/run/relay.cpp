@@ -5,12 +5,14 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <optional>
 #include <sstream>
+#include <vector>
 
 #include "app/cli/interrupt.hpp"
 #include "app/run/conversation.hpp"
@@ -133,6 +135,19 @@ void Conversation::relay(int requests) {
     std::fflush(stdout);
   };
 
+  /// What was asked before this process was stopped is void, but for a disarm.
+  const auto void_if_late = [&](std::vector<LiveRequest>* requested) {
+    if (stopped_s_ <= kStopped_s) return;
+    std::fprintf(stderr, "equipoise: was stopped for %.1f s: what was asked before is void\n", stopped_s_);
+    stopped_s_ = 0.0;
+    if (wish != signed_command_t::DISARM) wish = kNone;
+    motion.reset();
+    requested->erase(
+        std::remove_if(requested->begin(), requested->end(),
+                       [](const LiveRequest& r) { return r.action != signed_command_t::DISARM; }),
+        requested->end());
+  };
+
   const auto disarming = [&] { return wish == signed_command_t::DISARM && Clock::now() < wish_ends; };
   while ((!lines.ended() || disarming()) && !interrupted.load()) {
     listen(0.0);
@@ -140,18 +155,24 @@ void Conversation::relay(int requests) {
     if (robot().heard_ms != heard_ms) heard_at = Clock::now();
     heard_ms = robot().heard_ms;
     if (Clock::now() > heard_at + patience) fail("is heard no more");
+    std::vector<LiveRequest> requested;
     while (const auto line = lines.next()) {
       const auto request = live_request(*line);
       if (!request)
         throw InputError("--live: '" + *line +
                          "': expected arm, disarm, heading-reset, take, or drive FORWARD LEFT YAW in m/s, "
                          "m/s, turns/s");
-      if (request->action == signed_command_t::DRIVE) {
-        if (robot().turn == turn) motion = request->motion;
-      } else if (request->action == signed_command_t::ASK) {
+      requested.push_back(*request);
+    }
+    listen(0.0);  // and sees whether it was stopped
+    void_if_late(&requested);
+    for (const LiveRequest& request : requested) {
+      if (request.action == signed_command_t::DRIVE) {
+        if (robot().turn == turn) motion = request.motion;
+      } else if (request.action == signed_command_t::ASK) {
         turn = robot().turn;
-      } else if (wish != signed_command_t::DISARM || request->action == signed_command_t::DISARM) {
-        decide(request->action);
+      } else if (wish != signed_command_t::DISARM || request.action == signed_command_t::DISARM) {
+        decide(request.action);
       }
     }
     if (wish != kNone && robot().turn != wish_turn) {

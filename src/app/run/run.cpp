@@ -120,6 +120,9 @@ int run_board(const RunArguments& a, const RobotType& robot, const Board& board,
 int run(RunArguments a) {
   a.choice.backend = a.backend;
   if (a.backend != "sim") a.choice.fidelity.clear();
+  if (!a.robot_name.empty() && !runtime::is_command_name(a.robot_name))
+    throw InputError("--robot-name \"" + a.robot_name +
+                     "\": one to sixteen letters, digits, '-', '_' and '.', or no sender can name it");
   if (a.backend == "lockstep" && a.socket.empty()) throw InputError("--backend lockstep needs --socket PATH");
   if (a.backend == "board" && a.board.empty())
     throw InputError("--backend board needs --board FILE, e.g. config/boards/robotics_cape_mbbr.toml");
@@ -173,21 +176,25 @@ void add_run(Subcommand app) {
   command.option("--duration-s", a->duration_s, "stop after this long, s; 0: when told to")
       .show_default()
       .range(0.0, 360000.0);
-  command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second").range(-5.0, 5.0);
-  command.option("--drive-mps", a->drive_mps, "drive speed, m/s").range(-2.0, 2.0);
-  command.option("--path", a->path, kPathHelp);
+  const Option yaw = command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second").range(-5.0, 5.0);
+  const Option drive = command.option("--drive-mps", a->drive_mps, "drive speed, m/s").range(-2.0, 2.0);
+  const Option path = command.option("--path", a->path, kPathHelp);
   const Option arm = command.flag("--arm,!--no-arm", a->arm,
                                   "request the motors 0.5 s after the start (default: not on a board)");
   const Option key = command
                          .option("--command-key", a->command_key,
                                  "take commands of holders of this key (keygen, send) instead of the script")
                          .file();
-  command
-      .option("--remote", a->remote,
+  const Option remote =
+      command
+          .option(
+              "--remote", a->remote,
               "take commands of a gamepad, a keyboard or an app through an HC-06 instead of the script: a "
               "file, see remote learn and config/remotes")
-      .file()
-      .excludes(key);
+          .file()
+          .excludes(key);
+  // Of the script, which nobody follows when somebody commands.
+  for (const Option& scripted : {yaw, drive, path}) scripted.excludes(key).excludes(remote);
   command.option("--robot-name", a->robot_name, "its name for senders (default: as in the key)");
   command
       .option("--command-url", a->command_url,

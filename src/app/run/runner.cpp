@@ -8,15 +8,13 @@
 #include "app/guard/service_notify.hpp"
 #include "app/io/hardware.hpp"
 #include "app/remote/hand_remote.hpp"
+#include "app/run/journal.hpp"
 #include "app/run/trial_observer.hpp"
 #include "app/run/wires.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 
 namespace equipoise::app {
 namespace {
-
-/// Who commands, in the journal.
-void say_on_stderr(const std::string& what) { std::fprintf(stderr, "equipoise: %s\n", what.c_str()); }
 
 /// run.lcm, run-2.lcm, run-3.lcm: a new engine is a new trial.
 std::string numbered(const std::string& path, int trial) {
@@ -38,13 +36,13 @@ Runner::Runner(const RunArguments& a, const RobotType& robot, const Overrides& o
   if (!a.command_key.empty()) {
     remote_ = std::make_unique<runtime::CommandReceiver>(
         load_robot_key(a.command_key),
-        runtime::CommandReceiverOptions{a.robot_name, robot_->safety.command_timeout_s, say_on_stderr},
+        runtime::CommandReceiverOptions{a.robot_name, robot_->safety.command_timeout_s, journal},
         open_wire(a.command_url, runtime::WireSide::kRobot));
   } else if (!a.remote.empty()) {
     const RemoteFile file = load_remote(a.remote);
     remote_ = std::make_unique<HandRemote>(
         open_hand(file),
-        HandRemote::Options{file.speed_m_s, file.turn_hz, robot_->safety.command_timeout_s, say_on_stderr});
+        HandRemote::Options{file.speed_m_s, file.turn_hz, robot_->safety.command_timeout_s, journal});
   }
 }
 

@@ -104,7 +104,10 @@ async def serve(options: argparse.Namespace) -> int:
             cockpit.remote = Remote(
                 options.command_url or url, Path(options.key), options.holder, cockpit.changed
             )
-        server = tornado.httpserver.HTTPServer(application(cockpit))
+        # Nobody sends us a body; what comes before a request's host is known stays small.
+        server = tornado.httpserver.HTTPServer(
+            application(cockpit), max_body_size=1024, max_buffer_size=1 << 20, max_header_size=1 << 14
+        )
         server.add_sockets(sockets)
         try:
             await cockpit.load_parameters()

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import itertools
 import math
+import os
 import re
 import secrets
+import struct
 import time
 from collections import Counter, deque
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from equipoise_robot.lcm_types import message_types
-
-import lcm
 
 from .. import names
 from ..paths import UserError
@@ -24,7 +26,45 @@ if TYPE_CHECKING:
     from .server import Page
 
 SILENT_S = 1.0
+BEAT_S = 0.1
 FURTHER_PART = re.compile(r"\.\d{4,}\.lcm$")  # of a log: its first is opened
+
+
+class EventLog:
+    """An LCM event log. An event is in the file, whole, or an OSError says why not."""
+
+    _HEAD = struct.Struct(">IqqII")
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = path.open("xb", buffering=0)
+        self._bytes = self._events = 0
+
+    @classmethod
+    def new(cls, folder: Path, stem: str) -> EventLog:
+        """Under a name that nothing has yet."""
+        for number in itertools.count(1):
+            try:
+                return cls(folder / (f"{stem}-{number}.lcm" if number > 1 else f"{stem}.lcm"))
+            except FileExistsError:
+                continue
+        raise AssertionError
+
+    def write(self, utime: int, channel: str, data: bytes) -> None:
+        name = channel.encode()
+        event = self._HEAD.pack(0xEDA1DA01, self._events, utime, len(name), len(data)) + name + data
+        try:
+            written = self._file.write(event)
+            if written != len(event):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError:
+            self._file.truncate(self._bytes)
+            raise
+        self._bytes += len(event)
+        self._events += 1
+
+    def close(self) -> None:
+        self._file.close()
 
 
 class Cockpit:
@@ -40,7 +80,8 @@ class Cockpit:
         self.robot = options.robot
         self.parameters: list[dict] = []
         self.parameter_error = ""
-        self.recording: lcm.EventLog | None = None
+        self.recording: EventLog | None = None
+        self.recording_error = ""
         self.recorded: dict | None = None
         self.assembler = frames.Assembler()
         self.heard_s = -math.inf
@@ -58,10 +99,9 @@ class Cockpit:
     # From the robot.
 
     def hear(self, channel: str, data: bytes) -> None:
-        now_s = time.time()
+        now_s = time.monotonic()  # the machine's time of day may be set at any moment
         if self.recording is not None and channel.startswith("EQUIPOISE_"):
-            self.recording.write_event(int(now_s * 1e6), channel, data)
-            self.recorded["events"] += 1
+            self._keep(channel, data)
         if channel == names.RUN:
             self._hear_run(data)
             return
@@ -82,7 +122,7 @@ class Cockpit:
             self.robot = "mip" if wheels == 2 else "mbbr"
             self.changed()
         self.frames += 1
-        frame = frames.pack(frames.LIVE, now_s - self._lag_s, messages)
+        frame = frames.pack(frames.LIVE, time.time() - self._lag_s, messages)
         for page in self.pages:
             if page.playback is None:
                 page.offer(frame)
@@ -105,7 +145,7 @@ class Cockpit:
         return {
             "robot": self.robot,
             "run": self.run,
-            "heard": time.time() - self.heard_s < SILENT_S,
+            "heard": time.monotonic() - self.heard_s < SILENT_S,
             "simulated": self.simulated
             and {
                 "running": self.simulated.running,
@@ -116,6 +156,7 @@ class Cockpit:
             "remote": self.remote and {"status": self.remote.status, "error": self.remote.error},
             "controlled": self.in_control is not None,
             "recording": self.recorded if self.recording is not None else None,
+            "recording_error": self.recording_error,
             "foreign": self.assembler.foreign,
             "parameter_error": self.parameter_error,
         }
@@ -132,15 +173,23 @@ class Cockpit:
             page.tell(status=status | {"mine": page is self.in_control})
 
     async def watch(self) -> None:
-        """Notices silence."""
+        """Notices silence; tells the pages the time, which they give back with what a person does."""
         heard = False
         while True:
-            await asyncio.sleep(0.25)
-            if heard != (time.time() - self.heard_s < SILENT_S):
+            await asyncio.sleep(BEAT_S)
+            for page in self.pages:
+                page.beat(time.monotonic())
+            if heard != (time.monotonic() - self.heard_s < SILENT_S):
                 heard = not heard
                 self.changed()
             if self.recording is not None:  # its size grows
                 self.changed()
+
+    @property
+    def fresh_s(self) -> float:
+        """How old a request may be: a command's age, on the way to the page and on the way back."""
+        timeouts = [p["value"] for p in self.parameters if p["key"] == "safety.command_timeout_s"]
+        return 2.0 * (float(timeouts[0]) if timeouts else 0.5)
 
     async def load_parameters(self) -> None:
         if self.options.config is None:
@@ -196,14 +245,25 @@ class Cockpit:
 
     def record(self, on: bool) -> None:
         if on and self.recording is None:
-            self.options.logs.mkdir(parents=True, exist_ok=True)
-            name = time.strftime("cockpit-%Y-%m-%dT%H-%M-%S.lcm")
-            self.recording = lcm.EventLog(str(self.options.logs / name), "w", overwrite=True)
-            self.recorded = {"name": name, "since_s": time.time(), "events": 0}
+            self.recording_error = ""
+            try:
+                self.options.logs.mkdir(parents=True, exist_ok=True)
+                self.recording = EventLog.new(self.options.logs, time.strftime("cockpit-%Y-%m-%dT%H-%M-%S"))
+            except OSError as error:
+                raise UserError(f"recording: {self.options.logs}: {error.strerror}") from None
+            self.recorded = {"name": self.recording.path.name, "since_s": time.time(), "events": 0}
         elif not on and self.recording is not None:
             self.recording.close()
             self.recording = None
         self.changed()
+
+    def _keep(self, channel: str, data: bytes) -> None:
+        try:
+            self.recording.write(int(time.time() * 1e6), channel, data)
+            self.recorded["events"] += 1
+        except OSError as error:
+            self.recording_error = f"{self.recording.path.name}: recording stopped: {error.strerror}"
+            self.record(False)
 
     async def close(self) -> None:
         self.record(False)

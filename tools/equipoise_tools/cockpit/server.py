@@ -49,9 +49,10 @@ SECURITY_HEADERS = {
 
 
 def number(value, limit: float) -> float:
-    if not isinstance(value, (int, float)) or isinstance(value, bool) or not math.isfinite(value):
+    finite = isinstance(value, int) or (isinstance(value, float) and math.isfinite(value))
+    if not finite or isinstance(value, bool):
         raise UserError("a motion is made of numbers")
-    return min(max(float(value), -limit), limit)
+    return float(min(max(value, -limit), limit))  # limited first: an integer may have 400 digits
 
 
 class Page(tornado.websocket.WebSocketHandler):
@@ -65,6 +66,7 @@ class Page(tornado.websocket.WebSocketHandler):
         self.playback: Playback | None = None
         self.waiting: deque[bytes | str] = deque()
         self.dropped = 0
+        self._beat_s: float | None = None  # the newest, not yet sent
         self._ready = asyncio.Event()
         self._sender: asyncio.Task | None = None
         self._player: asyncio.Task | None = None
@@ -107,23 +109,34 @@ class Page(tornado.websocket.WebSocketHandler):
         if len(self.waiting) > 4 * QUEUE:  # it does not read at all
             self.close(4408, "too slow")
 
+    def beat(self, now_s: float) -> None:
+        """However slow the page is, one waits."""
+        self._beat_s = now_s
+        self._ready.set()
+
     async def _send(self) -> None:
         try:
             while True:
                 await self._ready.wait()
+                self._ready.clear()
+                if self._beat_s is not None:
+                    beat_s, self._beat_s = self._beat_s, None
+                    await self.write_message(json.dumps({"beat": beat_s}))
                 while self.waiting:
                     item = self.waiting.popleft()
                     await self.write_message(item, binary=isinstance(item, bytes))
-                self._ready.clear()
         except tornado.websocket.WebSocketClosedError:
             pass
 
     async def on_message(self, message: str | bytes) -> None:
         try:
             request = json.loads(message)
-            do = request["do"]
-        except (ValueError, TypeError, KeyError):
-            self.close(4400, "not a request")
+            do = str(request["do"])
+        except (ValueError, TypeError, KeyError, RecursionError):
+            if self.welcome:
+                self.tell(error="not a request")
+            else:
+                self.close(4400, "not a request")
             return
         if not self.welcome:
             self._greet(do, request)
@@ -132,7 +145,7 @@ class Page(tornado.websocket.WebSocketHandler):
             await self._obey(do, request)
         except UserError as error:
             self.tell(error=str(error))
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
             self.tell(error=f"{do}: not understood")
 
     def _greet(self, do: str, request: dict) -> None:
@@ -176,18 +189,23 @@ class Page(tornado.websocket.WebSocketHandler):
                 raise UserError("read-only: take control first")
             if self.playback is not None:
                 raise UserError("a log is being played: close it first")
+            line = do
             if do == "drive":
                 forward, left = (number(v, 2.0) for v in request["velocity_m_s"])
-                self._command(
-                    f"drive {forward:.4f} {left:.4f} {number(request['yaw_hz'], 5.0):.4f}", quiet=True
-                )
-            else:
-                self._command(do)
+                line = f"drive {forward:.4f} {left:.4f} {number(request['yaw_hz'], 5.0):.4f}"
+            age_s = time.monotonic() - number(request["seen"], 1e15)
+            if 0 <= age_s <= cockpit.fresh_s:
+                self._command(line, quiet=do == "drive")
+            elif do != "drive":
+                raise UserError(f"{do}: came {age_s:.1f} s late and is void: the connection was held up")
         elif do == "seen":
             cockpit.seen.append(request["page"] | {"lag_s": cockpit._lag_s, "dropped": self.dropped})
         elif do == "record":
             cockpit.record(bool(request["on"]))
         elif do == "restart":
+            running = cockpit.simulated is not None and cockpit.simulated.running
+            if running and cockpit.in_control is not self:
+                raise UserError("read-only: take control first")
             await cockpit.restart()
         elif do == "set":
             if cockpit.in_control is not self:

@@ -26,7 +26,9 @@ const stats = { frames: 0, drawn: 0, pictures: 0, fps: 0, latency_ms: [], socket
   get newest() { return newest; }, get status() { return status; } };
 window.cockpit = stats;
 
-const say = (request) => { if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request)); };
+// With what a person does goes the newest time of the cockpit's that has come: what was held up on its way is void.
+let seen = null;
+const say = (request) => { if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ ...request, seen })); };
 let messageTimer = 0;
 function message(text) {
   $("message").textContent = text;
@@ -51,6 +53,7 @@ function connect() {
 }
 
 function heard(event) {
+  if (event.beat !== undefined) { seen = event.beat; return; }
   if (event.hello) {
     decoder = new Decoder(event.hello.channels);
     words = event.hello.words;
@@ -128,7 +131,7 @@ function showStatus() {
   $("restart").classList.toggle("on", Boolean(simulated && !simulated.running));
   show("record", status.recording ? "Stop recording" : "Record");
   show("recording", status.recording ? status.recording.name : "");
-  if (status.parameter_error) message(status.parameter_error);
+  if (status.parameter_error || status.recording_error) message(status.parameter_error || status.recording_error);
   showParameterNote();
 }
 
@@ -298,6 +301,7 @@ const inputs = new Inputs({
   },
   stop: () => { if (status.mine) say({ do: "drive", velocity_m_s: [0, 0], yaw_hz: 0 }); },
   disarm: () => say({ do: "disarm" }),
+  ready: () => Boolean(status.mine && !playback && status.remote?.status?.state === "armed"),
 });
 $("take").onclick = () => say({ do: $("take").dataset.next });
 $("arm").onclick = () => say({ do: "arm" });

@@ -7,16 +7,16 @@ const clamp = (x) => Math.max(-1, Math.min(1, x));
 const element = (id) => document.getElementById(id);
 
 export class Inputs {
-  /** `send(forward, left, yaw)` in shares of full; `stop()` and `disarm()` at a key or button. */
-  constructor({ send, stop, disarm }) {
-    Object.assign(this, { send, stop, disarm });
+  /** `send(forward, left, yaw)` in shares of full; `stop()` and `disarm()` at a key or button; `ready()`: may move. */
+  constructor({ send, stop, disarm, ready }) {
+    Object.assign(this, { send, stop, disarm, ready });
     this.pressed = new Set();
     this.stick = [0, 0];
     this.turn = 0;
     this.ends = 0;
     this.padButtons = [];
     this.dragging = null; // the pointer that holds the stick
-    this.held = false; // after a stop, until the gamepad is let go
+    this.held = false; // after a stop, or pushed while nothing might move: until everything is let go
     this.listen();
     setInterval(() => this.tick(), PERIOD_MS);
   }
@@ -57,8 +57,8 @@ export class Inputs {
   }
 
   centre() { this.dragging = null; this.stick = [0, 0]; element("knob").style.transform = ""; }
-  letGo() { this.pressed.clear(); this.centre(); this.turn = 0; }
-  halt() { this.letGo(); this.held = true; this.ends = ENDS; this.stop(); }
+  letGo() { this.pressed.clear(); this.centre(); this.turn = 0; this.held = true; }
+  halt() { this.letGo(); this.ends = ENDS; this.stop(); }
 
   /** The first gamepad that is there: left stick drives, right stick's x turns, A stops, B disarms. */
   gamepad() {
@@ -83,7 +83,8 @@ export class Inputs {
   tick() {
     const motion = this.motion();
     const moves = motion.some((v) => v !== 0);
-    if (!moves) this.held = false;
+    if (!this.ready() || document.hidden || !document.hasFocus()) this.held = true;
+    else if (!moves) this.held = false;
     if (moves && !this.held) {
       this.ends = ENDS;
       this.send(...motion);
