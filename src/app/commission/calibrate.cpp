@@ -191,9 +191,11 @@ int run_calibrate(const CalibrateArguments& a) {
                         : a.what == "mount"  ? calibrate_mount(commissioning, &file, &json)
                         : a.what == "motors" ? calibrate_motors(commissioning, &file, &json)
                                              : calibrate_encoders(commissioning, &file, &json);
-  save_calibration(file, a.out);
+  const bool rejected = a.what == "accel" && !result.complaint.empty();  // others measure what is there
+  if (!rejected) save_calibration(file, a.out);
   std::FILE* const out = a.json == "-" ? stderr : stdout;
-  std::fprintf(out, "%s\nwritten to %s\n", result.text.c_str(), a.out.c_str());
+  std::fprintf(out, "%s\n%s %s\n", result.text.c_str(), rejected ? "not written to" : "written to",
+               a.out.c_str());
   json["what"] = a.what;
   json["file"] = a.out;
   json["complaint"] = result.complaint.empty() ? nlohmann::json(nullptr) : nlohmann::json(result.complaint);

@@ -36,9 +36,11 @@ struct Port {
   Port(const Port&) = delete;
   Port& operator=(const Port&) = delete;
 
-  /// Until it was quiet for a second after something came, or nothing came for so long, or Enter.
+  /// Until it was quiet for a second after something came, or nothing came for so long, or Enter; JobError
+  /// when it does not end.
   std::vector<Portion> listen(double wait_s) {
     constexpr double kQuiet_s = 1.0;
+    constexpr double kLongest_s = 20.0;
     std::vector<Portion> portions;
     for (double until_s = now_s() + wait_s; now_s() < until_s && !interrupted.load();) {
       constexpr int kPatience_ms = 50;
@@ -51,6 +53,8 @@ struct Port {
       if (count < 0) throw JobError("the serial port is gone");
       const auto* first = reinterpret_cast<const char*>(bytes.data());
       portions.push_back({now_s(), std::string(first, first + count)});
+      if (portions.back().t_s - portions.front().t_s > kLongest_s)
+        throw JobError("bytes come for 20 s without a pause of a second: no button of an app");
       until_s = now_s() + kQuiet_s;
     }
     if (interrupted.load()) throw JobError("interrupted; nothing was written");
