@@ -42,6 +42,17 @@ TEST(LoopTimingTest, OverrunsInARowForbidMotors) {
   EXPECT_TRUE(timing.overrun());
 }
 
+TEST(LoopTimingTest, OverrunsApartFromEachOtherDoNot) {
+  LoopTiming timing({});
+  std::int64_t now = kTick_ns;
+  for (int i = 0; i < 40; ++i) {
+    now += i % 4 == 3 ? 2 * kTick_ns : kTick_ns;
+    timing.begin(now, now);
+    EXPECT_FALSE(timing.overrun()) << i;
+  }
+  EXPECT_EQ(timing.now().overruns, 10);
+}
+
 TEST(TimeHistogramTest, QuantilesAreWithinABin) {
   TimeHistogram histogram;
   for (int i = 0; i < 990; ++i) histogram.add(20'000);

@@ -60,6 +60,16 @@ struct Turning {
   }
 };
 
+TEST(MbbrEkf, TakesTheYawGyrosBiasOffThatItWasStartedWith) {
+  Turning standing;
+  standing.rate_rad_s = 0.0;
+  standing.bias = Vec3(0.0, 0.0, 0.02);
+  EXPECT_NEAR(standing.after(10.0).estimate().theta_dot.z(), 0.0, 1e-3);
+  Turning turning;
+  turning.bias.z() = 0.05;
+  EXPECT_NEAR(turning.after(10.0).estimate().theta_dot.z(), turning.rate_rad_s, 0.005);
+}
+
 TEST(MbbrEkf, FindsACrookedMountWhileTurning) {
   const MbbrEkf filter = Turning().after(20.0);
   const MbbrEstimate x = filter.estimate();

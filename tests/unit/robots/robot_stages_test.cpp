@@ -1,9 +1,11 @@
 // What every robot's kinematics, view and errors must hold: the same tests for both, by type.
 #include <gtest/gtest.h>
 
+#include <complex>
+
 #include "equipoise/control/friction.hpp"
-#include "robots/mbbr/mbbr.hpp"
-#include "robots/mip/mip.hpp"
+#include "robots/mbbr/scheduled_feedback.hpp"
+#include "robots/mip/lqr_feedback.hpp"
 
 namespace equipoise {
 namespace {
@@ -47,6 +49,48 @@ TYPED_TEST(RobotStages, TruthHasNoError) {
   EXPECT_EQ(e.speed_squared, 0.0);
   EXPECT_GE(e.axes, 1);
   EXPECT_TRUE(v.theta_rad.isZero(0.0));
+}
+
+TEST(MipReference, ARobotThatIsHeldDoesNotStoreUpALeap) {
+  MipReferenceParams p;
+  p.max_phi_error_rad = 6.0;
+  MipReferenceStage stage(p);
+  stage.reset(MipEstimate{});
+  Command forwards;
+  forwards.velocity_W_m_s.x() = 0.2;
+  MipReference ref;
+  for (int k = 0; k < 60 * 200; ++k) ref = stage.update(forwards, MipEstimate{});  // it does not move
+  EXPECT_DOUBLE_EQ(ref.d_phi, 6.0);
+}
+
+TEST(MipLqrFeedback, ItsNextAnswerBeginsWithWhatTheLimitLetThrough) {
+  MipLqrParams p;
+  p.gains.lqr = {-10.0, 0.0, 0.0, 0.0, 0.5};
+  p.max_u = 1.0;
+  p.soft_start_s = 0.0;
+  MipLqrFeedback feedback(p);
+  MipReference ref;
+  ref.restart = true;
+  ref.d_theta = -3.0;  // asks for 30
+  EXPECT_DOUBLE_EQ(feedback.update(ref).x(), 1.0);
+  EXPECT_DOUBLE_EQ(feedback.update(MipReference{}).x(), 0.5);
+}
+
+/// At a constant speed beside a turn, upright, nothing accelerates the body: u from the linear model.
+TEST(MbbrScheduledFeedback, HoldsASteadySpeedInATurn) {
+  const MbbrParameters robot;
+  MbbrScheduledFeedbackParams p;
+  p.gains = design_mbbr(robot, MbbrDesignParams{});
+  for (const double yaw_rate : {0.0, 1.0, -2.0, 4.0}) {
+    const MbbrLinear s = mbbr_linear(robot, yaw_rate);
+    MbbrReference ref;
+    ref.yaw_rate = yaw_rate;
+    ref.phi_dot_star = Vec2(3.0, -1.0);
+    const Vec3 u = MbbrScheduledFeedback(p).update(ref);
+    const std::complex<double> held = -s.A(2, 3) / s.b(2, 0) * std::complex<double>(3.0, -1.0);
+    EXPECT_NEAR(u.x(), held.real(), 1e-6 + 1e-3 * std::abs(held)) << yaw_rate;
+    EXPECT_NEAR(u.y(), held.imag(), 1e-6 + 1e-3 * std::abs(held)) << yaw_rate;
+  }
 }
 
 TEST(MipKinematics, EncodersGiveMeanAngleAndYaw) {

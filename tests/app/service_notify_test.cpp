@@ -1,0 +1,67 @@
+// What the service manager hears of a loop: ready, a beat while it ticks, silence when it hangs, its end.
+#include "app/run/service_notify.hpp"
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include "support/log_folder.hpp"
+
+namespace equipoise::app {
+namespace {
+
+class Manager : public LogFolder {
+ protected:
+  Manager() : fd_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    const std::string name = (folder_ / "notify").string();
+    std::strcpy(address.sun_path, name.c_str());
+    EXPECT_EQ(bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    setenv("NOTIFY_SOCKET", name.c_str(), 1);
+    setenv("WATCHDOG_USEC", "200000", 1);
+  }
+  ~Manager() override {
+    unsetenv("NOTIFY_SOCKET");
+    unsetenv("WATCHDOG_USEC");
+    close(fd_);
+  }
+  std::vector<std::string> heard() const {
+    std::vector<std::string> all;
+    char text[100];
+    for (ssize_t n = 0; (n = recv(fd_, text, sizeof text, 0)) > 0;)
+      all.emplace_back(text, static_cast<std::size_t>(n));
+    return all;
+  }
+  static void wait(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
+
+  int fd_;
+};
+
+TEST_F(Manager, HearsALoopThatTicksAndNotOneThatHangs) {
+  {
+    ServiceNotify service;
+    wait(300);
+    EXPECT_TRUE(heard().empty()) << "no tick yet";
+    for (int tick = 0; tick < 80; ++tick, wait(5)) service.note(tick);
+    const std::vector<std::string> alive = heard();
+    ASSERT_GE(alive.size(), 2U);
+    EXPECT_EQ(alive.front(), "READY=1\nWATCHDOG=1");
+    EXPECT_EQ(alive.back(), "WATCHDOG=1");
+    wait(200);  // the last ticks' beat
+    (void)heard();
+    wait(600);
+    EXPECT_TRUE(heard().empty()) << "a loop that hangs is not kept alive";
+  }
+  EXPECT_EQ(heard(), std::vector<std::string>{"STOPPING=1"});
+}
+
+}  // namespace
+}  // namespace equipoise::app
