@@ -248,3 +248,19 @@ def test_learn_refuses_what_cannot_be_told_apart(root, tmp_path):
     assert status == 1 and "41 is disarm and arm" in said and not out.exists()
     status, said, out = taught(root, tmp_path, {"arm": [b"A"], "forward": [b"F"]})
     assert status != 0 and "needs arm and disarm" in said and not out.exists()
+
+
+def test_what_was_pressed_while_lines_was_stopped_is_void_but_for_a_disarm(root, tmp_path):
+    gamepad = Gamepad(tmp_path)
+    command = [root / "build/host/equipoise", "remote", "lines", gamepad.config]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as lines:
+        gamepad.arm()
+        assert lines.stdout.readline() == "arm\n"
+        lines.send_signal(signal.SIGSTOP)
+        gamepad.arm()
+        time.sleep(1.5)
+        lines.send_signal(signal.SIGCONT)
+        time.sleep(0.5)
+        gamepad.put(EV_KEY, BTN_EAST, 1)
+        assert lines.stdout.readline() == "disarm\n"
+        lines.terminate()

@@ -150,10 +150,17 @@ int lines(const std::string& path) {
   bool moved = false;
   bool present = true;
   double next_s = 0.0;
+  double looked_s = now_s();
+  double void_until_s = 0.0;
   while (!interrupted.load()) {
     constexpr int kLook_ms = 20;
     constexpr double kEvery_s = 0.05;
-    const Hand hand = gate.limit(device->look(kLook_ms));
+    constexpr double kStopped_s = 1.0;  // this process, or whoever reads its lines
+    constexpr double kQueued_s = 0.2;   // what was kept meanwhile comes at once
+    Hand hand = gate.limit(device->look(kLook_ms));
+    if (now_s() > looked_s + kStopped_s) void_until_s = now_s() + kQueued_s;
+    looked_s = now_s();
+    if (looked_s < void_until_s) hand.arm = hand.heading_reset = false;  // pressed who knows when
     if (hand.present != present)
       std::fprintf(stderr, "%s: %s\n", path.c_str(), hand.present ? "is back" : "is gone");
     present = hand.present;
