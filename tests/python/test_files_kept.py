@@ -60,13 +60,13 @@ def test_a_log_of_one_name_leaves_the_others(do, root, tmp_path, known_log):
     config = root / "config/edumip.toml"
     for name in ("x.20261122.lcm", "x.2024.lcm"):
         shutil.copy(known_log, tmp_path / name)
-    (tmp_path / "thesis.2024.txt").write_text("chapter 1")
+    (tmp_path / "essay.2024.txt").write_text("chapter 1")
     shutil.copy(config, tmp_path / "robot.toml")
     (tmp_path / "x.00001.lcm").write_text("stray")
     kept = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
     sim = ["sim", "--config", str(config), "--duration-s", "1", "--log"]
     do(*sim, "x.lcm", status=0)
-    do(*sim, "thesis.txt", status=0)
+    do(*sim, "essay.txt", status=0)
     assert "exists and is no log" in do(*sim, "robot.toml", status=1)
     run = ["run", "--backend", "sim", "--telemetry", "off", "--config", str(config), "--duration-s", "1"]
     assert "exists and is no log" in do(*run, "--log", "robot.toml", status=1)

@@ -285,8 +285,8 @@ std::string complaint(const std::vector<WheelFinding>& findings) {
 EncoderFinding turn_by_hand(ManualDrive& manual, const WheelLayout& layout, int wheel, int turns) {
   const RawSample start = manual.sample();
   manual.ask({Request::kTurnWheel,
-              "turn " + layout.name(wheel) + format(" forwards by %d whole turns, then press Enter", turns), wheel,
-              turns});
+              "turn " + layout.name(wheel) + format(" forwards by %d whole turns, then press Enter", turns),
+              wheel, turns});
   const auto moved = travel(start, manual.sample(), layout);
   const std::size_t most = largest(moved);
   if (std::abs(moved[most]) < 0.5)
