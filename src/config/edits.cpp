@@ -225,6 +225,26 @@ toml::table parsed_file(const std::string& path, const std::string& hint) {
   return parsed_text(text.str(), path);
 }
 
+void apply_base(toml::table& root, const std::string& path) {
+  constexpr int kMostBases = 8;  // a file may be its own by mistake
+  toml::table edits = std::move(root);
+  std::string file = path;
+  std::vector<std::pair<std::string, toml::table>> layers;
+  while (edits.contains("base")) {
+    const auto name = edits["base"].value_exact<std::string>();
+    if (!name) throw ConfigError(file + ": base: expected the name of a file");
+    if (layers.size() == kMostBases) throw ConfigError(path + ": base: more than 8 in a chain");
+    edits.erase("base");
+    const std::string beside = file.substr(0, file.rfind('/') + 1);
+    layers.emplace_back(file, std::move(edits));
+    file = name->rfind('/', 0) == 0 ? *name : beside + *name;
+    edits = parsed_file(file, "; it is the base of " + layers.back().first);
+  }
+  for (; !layers.empty(); layers.pop_back())
+    merge(edits, std::move(layers.back().second), layers.back().first, "");
+  root = std::move(edits);
+}
+
 void apply_includes(toml::table& root, const std::string& path) {
   const toml::node* include = root.get("include");
   if (include == nullptr) return;

@@ -20,6 +20,8 @@ std::string at(const std::string& path, const toml::source_region& where);
 toml::table parsed_file(const std::string& path, const std::string& hint);
 toml::table parsed_text(const std::string& text, const std::string& origin);
 
+/// `base = "robot.toml"`: what this file does not say is as that one has it, which may have a base, too.
+void apply_base(toml::table& root, const std::string& path);
 /// `include = ["fragment.toml"]`: files beside the configuration whose values replace its own, in order.
 void apply_includes(toml::table& root, const std::string& path);
 /// ConfigError where configuration and board file contradict each other.

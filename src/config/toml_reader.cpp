@@ -26,6 +26,7 @@ std::string range(double min, double max) { return shortest(min) + " to " + shor
 
 Document::Document(const std::string& path, const Overrides& overrides)
     : path_(path), root_(parsed_file(path, "; give a configuration with --config FILE")) {
+  apply_base(root_, path);
   // An include given with --set comes before the other overrides, so that these have the last word.
   const auto includes = [](const std::string& text) { return text.rfind("include=", 0) == 0; };
   for (const std::string& text : overrides.set) {
@@ -131,6 +132,14 @@ bool Section::boolean(const std::string& key) {
 }
 
 std::string Section::text(const std::string& key) { return string_value(key, "a string"); }
+
+std::vector<std::string> Section::texts(const std::string& key) {
+  const toml::array* array = value_node(key, "an array of strings").as_array();
+  if (array == nullptr || !array->is_homogeneous<std::string>()) fail(key, "expected an array of strings");
+  std::vector<std::string> out;
+  for (const toml::node& element : *array) out.push_back(element.as_string()->get());
+  return out;
+}
 
 std::string Section::string_value(const std::string& key, const std::string& allowed) {
   const auto value = value_node(key, allowed).value_exact<std::string>();

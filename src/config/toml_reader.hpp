@@ -55,6 +55,7 @@ class Section {
   int integer(const std::string& key, int min, int max);
   bool boolean(const std::string& key);
   std::string text(const std::string& key);
+  std::vector<std::string> texts(const std::string& key);
   /// A pair such as ["44e07000", 20].
   std::pair<std::string, int> text_and_integer(const std::string& key, int min, int max);
   /// An array of such pairs, at most `count`.

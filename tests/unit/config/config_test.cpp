@@ -189,6 +189,24 @@ TEST(Config, FragmentsReplaceValuesAndOverridesHaveTheLastWord) {
   EXPECT_THAT(error_of(kMbbr, {"include=3"}), HasSubstr("expected an array of file names"));
 }
 
+TEST(Config, AFileWithABaseSaysOnlyWhatDiffers) {
+  const std::string path = ::testing::TempDir() + "based.toml";
+  const auto based = [&](const std::string& base, const std::string& rest) {
+    std::ofstream(path) << "base = \"" << base << "\"\n" << rest;
+    return path;
+  };
+  const Loaded<MbbrConfig> loaded = load_mbbr(based(kMbbr, "[motor]\nresistance_ohm = 5.0\n"), {});
+  EXPECT_EQ(loaded.config.motor.resistance_ohm, 5.0);
+  EXPECT_EQ(loaded.config.motor.nominal_V, load_mbbr(kMbbr, {}).config.motor.nominal_V);
+  EXPECT_EQ(loaded.toml.find("base"), std::string::npos);  // the effective configuration stands alone
+  EXPECT_THAT(error_of(based(kMbbr, "[motor]\nresistence_ohm = 5.0\n")),
+              HasSubstr(path + ":3: motor.resistence_ohm: no such key"));
+  EXPECT_THAT(error_of(based(kMbbr, "[motor]\nresistance_ohm = -1\n")),
+              HasSubstr(path + ":3: motor.resistance_ohm: -1 is out of"));
+  EXPECT_THAT(error_of(based("gone.toml", "")), HasSubstr("it is the base of " + path));
+  EXPECT_THAT(error_of(based("based.toml", "")), HasSubstr("more than 8"));
+}
+
 TEST(Config, AMountThatIsNoRotationIsRefused) {
   EXPECT_THAT(error_of(kMbbr, {"calibration.R_BS=[1,0,0,0,1,0,0,0,-1]"}), HasSubstr("not a rotation matrix"));
 }
