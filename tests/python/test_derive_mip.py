@@ -184,3 +184,19 @@ def test_full_form_agrees_with_multipliers():
 
 def test_lateral_terms_do_no_work():
     assert sp.simplify(mip.lateral_terms().dot(sp.Matrix(mip.SPEEDS))) == 0
+
+
+def test_the_rotor_turns_with_the_wheel_against_the_body():
+    """Standing upright at rest, by Newton: the rotors add to the torques' own equation, not to the body's."""
+    p = FULL | {"I_r": 5e-5}
+    total = p["m_b"] * p["r"] ** 2 + 2 * p["m_w"] * p["r"] ** 2 + 2 * p["I_w1"]
+    coupled = total + p["m_b"] * p["r"] * p["l"]
+    body = coupled + p["m_b"] * p["l"] * (p["l"] + p["r"]) + p["I_b1"]
+    expected = np.linalg.solve([[body, coupled], [coupled, total + 2 * p["I_r"]]], [0.0, 2 * p["k1"] * 0.1])
+    accelerations = mip.exact_accelerations([0, 0, 0, 0], [0.1, 0.05], p)
+    np.testing.assert_allclose(accelerations[:2], expected, rtol=1e-9)
+    about_z = p["I_b3"] + 2 * p["I_w2"] + p["d"] ** 2 / 2 * ((p["I_w1"] + p["I_r"]) / p["r"] ** 2 + p["m_w"])
+    assert accelerations[2] == pytest.approx(p["d"] / p["r"] * p["k1"] * 0.05 / about_z)
+    coefficients = mip_header.model().numbers(p)
+    assert coefficients["theta_ddot_ux"] * 0.1 == pytest.approx(expected[0])
+    assert coefficients["phi_ddot_ux"] * 0.1 == pytest.approx(expected[1])

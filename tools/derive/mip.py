@@ -29,6 +29,7 @@ TABLE_3_2 = {
     "I_b3": 2.91e-4,
     "I_w1": 6.42e-5,
     "I_w2": 7.48e-6,
+    "I_r": 0.0,
     "k1": 0.12,
     "k2": 0.003,
     "g": 9.8,
@@ -48,7 +49,8 @@ LUMPED = {
     "A": P["I_b1"] + 2 * P["I_w1"] + P["m_b"] * (P["l"] + P["r"]) ** 2 + 2 * P["m_w"] * P["r"] ** 2,
     "B": 2 * P["I_w1"] + 2 * P["m_w"] * P["r"] ** 2 + P["m_b"] * P["r"] * (P["l"] + P["r"]),
     "W": 2 * P["I_w1"] + (P["m_b"] + 2 * P["m_w"]) * P["r"] ** 2,
-    "Z": P["I_b3"] + 2 * P["I_w2"] + P["d"] ** 2 / 2 * (P["I_w1"] / P["r"] ** 2 + P["m_w"]),
+    "V": 2 * P["I_w1"] + (P["m_b"] + 2 * P["m_w"]) * P["r"] ** 2 + 2 * P["I_r"],
+    "Z": P["I_b3"] + 2 * P["I_w2"] + P["d"] ** 2 / 2 * ((P["I_w1"] + P["I_r"]) / P["r"] ** 2 + P["m_w"]),
     "C": P["I_b2"] - P["I_b3"] + P["m_b"] * P["l"] ** 2,
     "S": P["lateral"] * P["m_b"] * P["l"] * P["r"],
     "G": P["m_b"] * P["g"] * P["l"],
@@ -96,6 +98,9 @@ def exact():
         kane.inertia(velocity, P["m_w"] * velocity, m.yaw_rate)
         torque = P["k1"] * (INPUT[0] + sign * INPUT[1]) - P["k2"] * encoder_rate  # [T] (3.16)
         kane.force(sp.Matrix([encoder_rate]), sp.Matrix([torque]))
+        # The rotor, reflected: it turns with the wheel against the body, so much faster than the body that
+        # the body's own rate adds little (one part in the gear ratio).
+        kane.inertia(sp.Matrix([encoder_rate]), sp.Matrix([P["I_r"] * encoder_rate]))
     mass, rhs = kane.equations()
     rhs -= (1 - P["lateral"]) * lateral_terms()
     return mass, rhs
@@ -133,7 +138,11 @@ def lump(expression):
     in_order = [
         (p["I_b1"], s["A"] - 2 * p["I_w1"] - p["m_b"] * reach**2 - 2 * p["m_w"] * p["r"] ** 2),
         (p["I_b2"], s["C"] + p["I_b3"] - p["m_b"] * p["l"] ** 2),
-        (p["I_b3"], s["Z"] - 2 * p["I_w2"] - p["d"] ** 2 / 2 * (p["I_w1"] / p["r"] ** 2 + p["m_w"])),
+        (
+            p["I_b3"],
+            s["Z"] - 2 * p["I_w2"] - p["d"] ** 2 / 2 * ((p["I_w1"] + p["I_r"]) / p["r"] ** 2 + p["m_w"]),
+        ),
+        (p["I_r"], (s["V"] - s["W"]) / 2),
         (p["lateral"], s["S"] / (p["m_b"] * p["l"] * p["r"])),
         (p["g"], s["G"] / (p["m_b"] * p["l"])),
         (p["m_b"], (s["B"] - s["W"]) / (p["l"] * p["r"])),

@@ -58,7 +58,7 @@ def model() -> Model:
             ),
         ],
         lumped=mip.LUMPED,
-        denominators={"D": lumped["A"] * lumped["W"] - lumped["B"] ** 2},
+        denominators={"D": lumped["A"] * lumped["V"] - lumped["B"] ** 2},
         parameter_comments={
             "m_b": "body",
             "m_w": "one wheel",
@@ -68,6 +68,7 @@ def model() -> Model:
             "I_b1": "body about its centre of mass; 1: along the axle",
             "I_w1": "one wheel about its axle",
             "I_w2": "one wheel across its axle",
+            "I_r": "rotor of one motor through its gear, about the wheel's angle against the body",
             "k1": "torque of one motor per unit of u",
             "k2": "back-EMF of one motor",
             "l_ay": "axle to the IMU",

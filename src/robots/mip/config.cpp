@@ -25,6 +25,7 @@ MipParameters read_robot(Section s) {
   p.I_w1 = wheel.x();
   p.I_w2 = wheel.y();
   p.I_w3 = wheel.z();
+  p.I_r = config::number_or(s, "rotor_inertia_kg_m2", 0.0, 0.0, 1.0);
   p.k1 = s.number("k1_N_m", 1e-4, 100.0);
   p.k2 = s.number("k2_N_m_s", 0.0, 10.0);
   p.mu_c = s.number("coulomb_friction_N_m", 0.0, 10.0);

@@ -20,11 +20,11 @@ using MipMotion = MipMotionOf<double>;
 /// What the dynamics need of a robot; names and units: MipParameters.
 template <class Real>
 struct MipBodiesOf {
-  Real m_b, m_w, r, d, l, I_b1, I_b2, I_b3, I_w1, I_w2, I_w3;
+  Real m_b, m_w, r, d, l, I_b1, I_b2, I_b3, I_w1, I_w2, I_w3, I_r;
 };
 using MipBodies = MipBodiesOf<double>;
 inline MipBodies bodies(const MipParameters& p) noexcept {
-  return {p.m_b, p.m_w, p.r, p.d, p.l, p.I_b1, p.I_b2, p.I_b3, p.I_w1, p.I_w2, p.I_w3};
+  return {p.m_b, p.m_w, p.r, p.d, p.l, p.I_b1, p.I_b2, p.I_b3, p.I_w1, p.I_w2, p.I_w3, p.I_r};
 }
 
 template <class Real>
@@ -40,7 +40,8 @@ class MipDynamicsOf {
   /// About the vertical, of body and wheels; `s`: sine of theta.
   Real yaw_inertia(const Real& s) const noexcept {
     const Real C = p_.I_b2 - p_.I_b3 + 2.0 * (p_.I_w2 - p_.I_w3) + p_.l * (p_.l * p_.m_b);
-    return p_.I_b3 + 2.0 * p_.I_w3 + C * s * s + 0.5 * p_.d * p_.d * (p_.I_w1 / (p_.r * p_.r) + p_.m_w);
+    return p_.I_b3 + 2.0 * p_.I_w3 + C * s * s +
+           0.5 * p_.d * p_.d * ((p_.I_w1 + p_.I_r) / (p_.r * p_.r) + p_.m_w);
   }
   const Real& wheel_radius_m() const noexcept { return p_.r; }
 
@@ -60,7 +61,7 @@ VecOf<Real, 3> MipDynamicsOf<Real>::accelerations(const MipMotionOf<Real>& m, co
 
   const Real m11 = p_.I_b1 + p_.l * lm + 2.0 * lm * p_.r * c + wheels;
   const Real m12 = wheels + lm * p_.r * c;
-  const Real m22 = wheels;
+  const Real m22 = wheels + 2.0 * p_.I_r;
   const Real m33 = yaw_inertia(s);
 
   const Real b1 =

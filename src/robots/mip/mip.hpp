@@ -23,6 +23,7 @@ struct MipParameters {
   double I_w1 = 6.42e-5;  // one wheel, about its axle
   double I_w2 = 7.48e-6;
   double I_w3 = 7.48e-6;
+  double I_r = 0.0;           // rotor of one motor through its gear, about the wheel's angle against the body
   double k1 = 0.12;           // torque per unit of u, one motor
   double k2 = 0.003;          // back-EMF, one motor
   double mu_c = 0.0;          // Coulomb friction, one wheel

@@ -14,6 +14,7 @@ MipCoefficients mip_coefficients(const MipParameters& p, double l_ay, double l_a
   g.I_b3 = p.I_b3;
   g.I_w1 = p.I_w1;
   g.I_w2 = p.I_w2;
+  g.I_r = p.I_r;
   g.k1 = p.k1;
   g.k2 = p.k2 + p.mu_v;
   g.g = kGravity_m_s2;

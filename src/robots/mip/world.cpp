@@ -79,7 +79,7 @@ MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, con
 
 Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept {
   if (lifted()) {  // the body is in a hand, the wheels are in the air
-    const Vec2 wheel = wheel_torque / robot_.I_w1;
+    const Vec2 wheel = wheel_torque / (robot_.I_w1 + robot_.I_r);
     return {0.0, kinematics_.phi(wheel), 0.0};
   }
   Vec3 a = MipLevelOf<double>{dynamics_}.accelerations(s, facing, wheel_torque);
@@ -97,9 +97,10 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
     const double downhill = -facing.heading.back(weight_W).y() - held_back + ground_N_(0);
     const double c = facing.tilt.cosine();
     const double lm = robot_.l * robot_.m_b;
-    const double m22 = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;
-    const double m12 = m22 + lm * robot_.r * c;
-    const double m11 = robot_.I_b1 + robot_.l * lm + 2.0 * lm * robot_.r * c + m22;
+    const double wheels = 2.0 * robot_.I_w1 + (robot_.m_b + 2.0 * robot_.m_w) * robot_.r * robot_.r;
+    const double m22 = wheels + 2.0 * robot_.I_r;
+    const double m12 = wheels + lm * robot_.r * c;
+    const double m11 = robot_.I_b1 + robot_.l * lm + 2.0 * lm * robot_.r * c + wheels;
     const double det = m11 * m22 - m12 * m12;
     const double f1 = forward * (robot_.r + robot_.l * c) + downhill * robot_.r;
     const double f2 = (forward + downhill) * robot_.r;
