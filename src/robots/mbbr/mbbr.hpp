@@ -3,6 +3,8 @@
 // RT-safe after construction.
 #pragma once
 
+#include <optional>
+
 #include "equipoise/control/allocate.hpp"
 #include "equipoise/samples.hpp"
 #include "equipoise/types.hpp"
@@ -29,6 +31,13 @@ struct MbbrParameters {
   Vec3 l_a{0.0, 0.0, 0.130};  // ball centre to IMU, body axes
   double alpha_deg = 60.0;    // wheel latitude from the north pole
   double azimuth_deg = -140.0;
+  std::optional<double> wheel_tilt_deg;  // beta, about the contact's normal; none: orthogonal wheels
+
+  Mat3 wheel_axes() const noexcept {
+    const double alpha = alpha_deg * kPi / 180.0;
+    const double beta = wheel_tilt_deg ? *wheel_tilt_deg * kPi / 180.0 : orthogonal_beta_rad(alpha);
+    return equipoise::wheel_axes(alpha, beta, azimuth_deg * kPi / 180.0);
+  }
 };
 
 /// Ball rate relative to the body, body axes, to the wheels'; and from wheel torques to the torque on the
@@ -49,11 +58,13 @@ class MbbrKinematics {
  public:
   explicit MbbrKinematics(const MbbrParameters& p)
       : ratio_(p.r / p.r_w),
-        T_ob_(wheel_axes(p.alpha_deg * kPi / 180.0, orthogonal_beta_rad(p.alpha_deg * kPi / 180.0),
-                         p.azimuth_deg * kPi / 180.0)) {}
+        T_ob_(p.wheel_axes()),
+        T_ob_inverse_(p.wheel_tilt_deg ? Mat3(T_ob_.inverse()) : Mat3(T_ob_.transpose())) {}
 
   /// Ball angle (or rate) relative to the body, body axes, from wheel angles (or rates). (5.3)
-  Vec3 ball_from_wheels(const Vec3& wheels) const noexcept { return (1.0 / ratio_) * (T_ob_ * wheels); }
+  Vec3 ball_from_wheels(const Vec3& wheels) const noexcept {
+    return (1.0 / ratio_) * (T_ob_inverse_.transpose() * wheels);
+  }
   Vec3 wheels_from_ball(const Vec3& ball_B) const noexcept {
     return equipoise::wheels_from_ball<double>(ratio_, T_ob_, ball_B);
   }
@@ -67,7 +78,7 @@ class MbbrKinematics {
     return equipoise::axes_from_wheels<double>(ratio_, T_ob_, wheels);
   }
   Vec3 wheels_from_axes(const Vec3& axes_B) const noexcept {
-    return (1.0 / ratio_) * (T_ob_.transpose() * axes_B);
+    return (1.0 / ratio_) * (T_ob_inverse_ * axes_B);
   }
 
   /// Wheels within +-limit: balance, in the plane, before yaw.
@@ -82,6 +93,7 @@ class MbbrKinematics {
  private:
   double ratio_;  // r / r_w
   Mat3 T_ob_;
+  Mat3 T_ob_inverse_;
 };
 
 /// What the estimators know, and what the simulation's truth is.

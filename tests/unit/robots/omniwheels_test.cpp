@@ -42,6 +42,27 @@ TEST(MbbrKinematics, WheelsAndAxesAreInverse) {
   EXPECT_NEAR(k.axes_from_wheels(Vec3::Unit(0)).norm(), 0.032 / 0.0125, 1e-12);
 }
 
+// Plain omniwheels, axes along the meridian at 45 degrees (rob311, OpenBallBot-RL): not orthogonal.
+TEST(MbbrKinematics, WheelsThatAreNotOrthogonalAreInverseToo) {
+  MbbrParameters p;
+  p.alpha_deg = 45.0;
+  p.azimuth_deg = 0.0;
+  p.wheel_tilt_deg = 0.0;
+  const MbbrKinematics k(p);
+  const Vec3 ball(0.3, -0.7, 0.2);
+  EXPECT_TRUE(k.ball_from_wheels(k.wheels_from_ball(ball)).isApprox(ball, 1e-12));
+  EXPECT_TRUE(k.axes_from_wheels(k.wheels_from_axes(ball)).isApprox(ball, 1e-12));
+  // 3-D geometry: the ball turns about x; its surface at the contact of wheel 0 moves across that wheel's
+  // axis.
+  const Vec3 contact = p.r * Vec3(-std::sin(kPi / 4), 0.0, std::cos(kPi / 4));  // its axis rises along -x
+  const Vec3 surface = Vec3::UnitX().cross(contact);
+  const Vec3 axis(std::cos(kPi / 4), 0.0, std::sin(kPi / 4));
+  const double along = surface.dot(axis.cross(contact.normalized()));
+  EXPECT_NEAR(k.wheels_from_ball(Vec3::UnitX())(0), along / p.r_w, 1e-12);
+  // What drives it equally about z turns it as fast as the axes' rise says, not as if they were orthogonal.
+  EXPECT_NEAR(k.ball_from_wheels(Vec3::Ones()).z(), p.r_w / p.r / std::sin(kPi / 4), 1e-12);
+}
+
 TEST(MbbrKinematics, EulerAndBodyRatesAreInverse) {
   const Vec2 theta(0.3, -0.4);
   const Vec3 rates(1.0, -2.0, 5.0);
