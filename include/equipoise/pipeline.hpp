@@ -32,6 +32,7 @@ struct TickResult {
 template <class Robot, class Estimators, class Reference, class Feedback>
 class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
  public:
+  using RobotType = Robot;
   using Input = Vec<Robot::kInputs>;
   using Wheels = Vec<Robot::kWheels>;
   using Result = TickResult<Robot, Reference>;
@@ -62,6 +63,15 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   Result tick(const RawSample& raw, const Command& asked, const LoopState& loop) noexcept;
 
+  /// What acted since the last tick, where somebody else drives the motors (a log, another tuning): `u` as
+  /// the estimators' linear model has it; `held`: motors off. Given before the tick, in place of its own.
+  void applied(const Input& u, bool held) noexcept {
+    u_previous_ = u;
+    held_ = held;
+  }
+  const Input& applied() const noexcept { return u_previous_; }
+  bool held() const noexcept { return held_; }
+
   Estimators& estimators() noexcept { return estimators_; }
   const Estimators& estimators() const noexcept { return estimators_; }
   const Params& params() const noexcept { return p_; }
@@ -77,7 +87,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   /// The model runs on through missed ticks, bounded by Freshness::kMaxTicks. The bridges held the last
   /// command until the guard let go, if it did; then the motors coasted.
   void bridge_gap(const typename Robot::Sample& z, std::uint32_t inhibit) noexcept {
-    if (!safety_.armed() || z.ticks <= 1) return;
+    if (held_ || z.ticks <= 1) return;
     typename Robot::Sample nothing = z;
     nothing.imu_ok = nothing.encoders_ok = nothing.attitude_ok = false;
     for (int missed = 1; missed < z.ticks; ++missed) {
@@ -223,6 +233,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   Wheels duty_previous_ = Wheels::Zero();
   Wheels wheel_rate_rad_s_ = Wheels::Zero();  // as expected in the next tick
   Input u_previous_ = Input::Zero();
+  bool held_ = true;
 };
 
 // Not inline: a robot's pipelines are compiled once, in its pipeline.cpp.
@@ -231,8 +242,8 @@ auto Pipeline<Robot, Estimators, Reference, Feedback>::tick(const RawSample& raw
                                                             const LoopState& loop) noexcept -> Result {
   Result t;
   t.z = senses_.update(raw, loop.now_ns, wheel_rate_rad_s_, estimators_.reads_attitude());  // counts -> SI
-  bridge_gap(t.z, loop.inhibit);                                     // ticks that the loop has missed
-  t.x_hat = estimators_.update(t.z, u_previous_, !safety_.armed());  // [T] ch. 3, 6.1
+  bridge_gap(t.z, loop.inhibit);                          // ticks that the loop has missed
+  t.x_hat = estimators_.update(t.z, u_previous_, held_);  // [T] ch. 3, 6.1
   health_ = estimators_.health();
   t.degraded = do_without(t.z);
   t.ref = follow(limited(safety_.timely(asked), t.degraded), t.x_hat);  // [T] 6.2.1
@@ -242,7 +253,7 @@ auto Pipeline<Robot, Estimators, Reference, Feedback>::tick(const RawSample& raw
   t.u_friction = t.u_lin + friction;            // [T] 6.2.2
   const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
   t.motors = safety_.gate(duty, checks(t, asked, loop.inhibit));
-  u_previous_ = applied_input(t, friction);
+  applied(applied_input(t, friction), !safety_.armed());
   duty_previous_ = wheel_duty(t.motors);
   t.arm_state = safety_.state();
   t.reasons = safety_.reasons();
