@@ -6,6 +6,7 @@ void add_commands(Subcommand app) {
   add_sim(app);
   add_run(app);
   add_replay(app);
+  add_import(app);
   add_convert(app);
   add_keygen(app);
   add_send(app);

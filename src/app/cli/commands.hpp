@@ -15,6 +15,7 @@ void add_keygen(Subcommand app);
 void add_send(Subcommand app);
 void add_remote(Subcommand app);
 void add_replay(Subcommand app);
+void add_import(Subcommand app);
 void add_model(Subcommand app);
 void add_bridge(Subcommand app);
 void add_geometry(Subcommand app);

@@ -1,0 +1,141 @@
+#include "app/import/table.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "app/cli/commands.hpp"
+
+namespace equipoise::app {
+namespace {
+
+bool ends_in(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+/// Comma, semicolon or tab where a line has one, else runs of blanks; blanks around a cell do not count.
+void split(std::string_view line, std::vector<std::string_view>* cells) {
+  constexpr std::string_view kBlank = " \t\r\"";
+  cells->clear();
+  const std::size_t found = line.find_first_of(",;\t");
+  const char separator = found == std::string_view::npos ? ' ' : line[found];
+  while (true) {
+    const std::size_t begin = line.find_first_not_of(separator == '\t' ? " \r\"" : kBlank);
+    line.remove_prefix(begin == std::string_view::npos ? line.size() : begin);
+    if (separator == ' ' && line.empty()) return;
+    const std::size_t end = line.find(separator);
+    std::string_view cell = line.substr(0, end);
+    cell = cell.substr(0, cell.find_last_not_of(kBlank) + 1);
+    cells->push_back(cell);
+    if (end == std::string_view::npos) return;
+    line.remove_prefix(end + 1);
+  }
+}
+
+bool number(std::string_view cell, double* value) {
+  if (cell.empty() || cell == "nan" || cell == "NaN") {
+    *value = std::numeric_limits<double>::quiet_NaN();
+    return true;
+  }
+  if (cell.front() == '+') cell.remove_prefix(1);
+  const auto end = std::from_chars(cell.data(), cell.data() + cell.size(), *value);
+  return end.ec == std::errc() && end.ptr == cell.data() + cell.size();
+}
+
+void start(std::vector<std::string> names, Table* table) {
+  table->names = std::move(names);
+  table->columns.resize(table->names.size());
+}
+
+Table read_text_table(const std::string& path, const TableShape& shape) {
+  Table table;
+  if (!shape.columns.empty()) start(shape.columns, &table);
+  const std::string text = read_text(path);
+  if (text.find('\0') != std::string::npos)
+    throw InputError(path +
+                     ": is no text; rows of float32 are read with table.format = \"float32\" in the map");
+  std::vector<std::string_view> cells;
+  std::vector<double> row;
+  int number_of_line = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::string_view line(text.data() + at, end - at);
+    at = end + 1;
+    ++number_of_line;
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    if (first == std::string_view::npos || line[first] == '%' || line[first] == '#') continue;
+    split(line, &cells);
+    if (table.names.empty()) {
+      start({cells.begin(), cells.end()}, &table);
+      double value = 0.0;
+      if (!number(cells.front(), &value)) continue;
+      throw InputError(path + ":" + std::to_string(number_of_line) +
+                       ": no line of column names; name them in the map: table.columns = [...]");
+    }
+    row.clear();
+    std::size_t wrong = cells.size();
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      row.emplace_back();
+      if (!number(cells[i], &row.back())) wrong = std::min(wrong, i);
+    }
+    const bool head = wrong == 0 && table.rows() == 0;  // of a table that the map names the columns of
+    if (head) continue;
+    if (row.size() == table.names.size() + 1 && std::isnan(row.back())) row.pop_back();  // "1,2,3,"
+    if (row.size() != table.names.size()) {
+      ++table.torn_rows;
+      continue;
+    }
+    if (wrong < row.size()) {
+      throw InputError(path + ":" + std::to_string(number_of_line) + ": " + table.names[wrong] + ": \"" +
+                       std::string(cells[wrong]) + "\" is not a number");
+    }
+    for (std::size_t i = 0; i < row.size(); ++i) table.columns[i].push_back(row[i]);
+  }
+  if (table.rows() == 0 && table.torn_rows > 0) {
+    throw InputError(path + ": its rows have " + std::to_string(row.size()) + " cells, table.columns names " +
+                     std::to_string(table.names.size()));
+  }
+  return table;
+}
+
+Table read_float32_table(const std::string& path, const TableShape& shape) {
+  if (shape.columns.empty())
+    throw InputError(path + ": table.columns is missing; float32 rows have no names");
+  Table table;
+  start(shape.columns, &table);
+  const std::string bytes = read_text(path);
+  const std::size_t width = 4 * table.names.size();
+  const auto header = static_cast<std::size_t>(shape.header_bytes);
+  const std::size_t rows = bytes.size() < header ? 0 : (bytes.size() - header) / width;
+  if (rows > 0 && (bytes.size() - header) % width != 0) table.torn_rows = 1;
+  for (std::size_t i = 0; i < table.columns.size(); ++i) {
+    table.columns[i].resize(rows);
+    for (std::size_t k = 0; k < rows; ++k) {
+      std::uint32_t bits = 0;
+      for (std::size_t b = 4; b > 0; --b)
+        bits = bits << 8U | static_cast<unsigned char>(bytes[header + k * width + 4 * i + b - 1]);
+      float value = 0.0F;
+      std::memcpy(&value, &bits, sizeof value);
+      table.columns[i][k] = static_cast<double>(value);
+    }
+  }
+  return table;
+}
+
+}  // namespace
+
+Table read_table(const std::string& path, const TableShape& shape) {
+  for (const char* other : {".mat", ".parquet", ".feather", ".h5", ".xlsx"}) {
+    if (ends_in(path, other)) {
+      throw InputError(path + ": is no text; make a CSV of it: ./tools/table " + path + " > " +
+                       path.substr(0, path.rfind('.')) + ".csv");
+    }
+  }
+  Table table = shape.float32 ? read_float32_table(path, shape) : read_text_table(path, shape);
+  if (table.rows() < 2)
+    throw InputError(path + ": has " + std::to_string(table.rows()) + " rows; 2 are the least");
+  return table;
+}
+
+}  // namespace equipoise::app
