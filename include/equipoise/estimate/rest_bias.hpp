@@ -1,6 +1,6 @@
-// Gyro bias of a robot that is held still, whatever its size: at rest the rate varies no more than the sensor's
-// noise explains. In: body rates -> out: their mean over the last stretch of rest, and whether there has been
-// one. A body that is turned begins the stretch anew. RT-safe.
+// Gyro bias of a robot that is held still, whatever its size: at rest the rate varies no more than the
+// sensor's noise explains. In: body rates -> out: their mean over the last stretch of rest, and whether there
+// has been one. A body that is turned begins the stretch anew. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -25,17 +25,23 @@ class RestBias {
     return bias_;
   }
 
+  /// Known from elsewhere, of a robot that moves already.
+  void tell(const Vec3& bias_B_rad_s) noexcept {
+    bias_ = bias_B_rad_s;
+    known_ = true;
+  }
   /// The robot has been at rest since power-on: the bias is known.
   bool known() const noexcept { return known_; }
 
  private:
   static constexpr double kRange_rad_s = 35.0;  // of the sensor, 2000 deg/s; NaN fails, too
-  static constexpr int kBlock = 25;             // ticks, 0.125 s: the mean of hand tremor (8 to 12 Hz) vanishes
-  static constexpr int kWindow = 400;           // ticks of the stretch that count
+  static constexpr int kBlock = 25;    // ticks, 0.125 s: the mean of hand tremor (8 to 12 Hz) vanishes
+  static constexpr int kWindow = 400;  // ticks of the stretch that count
   // A bias that is off by this is found in motion (initial_sigma of the filters: 0.005 rad/s, 4 sigma).
   static constexpr double kTurns_rad_s = 0.02;
   static constexpr double kSigmas = 4.0;  // of the means' noise
-  // MPU-9250, data sheet: 5 deg/s at 25 degrees C, 0.24 deg/s per K over 25 K. More is a turning body or a fault.
+  // MPU-9250, data sheet: 5 deg/s at 25 degrees C, 0.24 deg/s per K over 25 K. More is a turning body or a
+  // fault.
   static constexpr double kLargest_rad_s = (5.0 + 0.24 * 25.0) * kPi / 180.0;
 
   void end_block() noexcept {
@@ -43,8 +49,7 @@ class RestBias {
     const Vec3 mean = sum_ / kBlock;
     // Half the mean squared successive difference is the variance of the noise alone (von Neumann 1941).
     const Vec3 noise = (roughness_ / (2.0 * (kBlock - 1))).cwiseSqrt();
-    const Vec3 tolerance =
-        Vec3::Constant(kTurns_rad_s) + kSigmas * std::sqrt(2.0 / kBlock) * noise;
+    const Vec3 tolerance = Vec3::Constant(kTurns_rad_s) + kSigmas * std::sqrt(2.0 / kBlock) * noise;
     const bool plausible = ((mean.cwiseAbs() - tolerance).array() < kLargest_rad_s).all();
     const bool same = ((mean - mean_).cwiseAbs().array() < tolerance.array()).all();
     samples_ = !plausible ? 0 : samples_ > 0 && same ? std::min(samples_ + kBlock, kWindow) : kBlock;

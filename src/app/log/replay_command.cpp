@@ -3,6 +3,7 @@
 
 #include "app/cli/commands.hpp"
 #include "app/log/replay.hpp"
+#include "app/log/shadow.hpp"
 #include "app/text/json.hpp"
 #include "app/text/reasons.hpp"
 #include "app/text/version.hpp"
@@ -14,6 +15,8 @@ struct ReplayArguments {
   std::string log;
   std::string json;
   Beside beside;
+  bool shadow = false;
+  std::string config;  // of the shadow
 };
 
 std::string shown(double value) {
@@ -118,9 +121,28 @@ void print(std::FILE* out, const ReplayArguments& a, const runtime::RunInfo& run
   if (!a.beside.estimator.empty()) print(out, run, a.beside.estimator, r.other);
 }
 
+int run_shadow(RunLog& log, const ReplayArguments& a) {
+  const Shadow shadow = shadow_log(log, a.log, a.config, a.beside.set);
+  std::FILE* out = a.json == "-" ? stderr : stdout;
+  std::fprintf(out, "%s: %s, shadow of the %s filter\n", a.log.c_str(), log.run().robot.c_str(), "default");
+  shadow.print(out);
+  nlohmann::json json = shadow.json();
+  json["log"] = a.log;
+  json["robot"] = log.run().robot;
+  json["config"] = a.config.empty() ? nlohmann::json(nullptr) : nlohmann::json(a.config);
+  json["version"] = version();
+  if (!a.json.empty()) write_json(json, a.json);
+  return 0;
+}
+
 int run(const ReplayArguments& a) {
   RunLog log(a.log);
   log.show_progress("replay");
+  if (a.shadow) return run_shadow(log, a);
+  if (log.run().backend == "import") {
+    throw InputError(a.log +
+                     ": another robot's, imported; nothing of it is ours to compare with. Use --shadow");
+  }
   const Replay r = replay_log(log, a.log, a.beside);
   print(a.json == "-" ? stderr : stdout, a, log.run(), r);
   if (!a.json.empty()) write_json(to_json(a, log.run(), r), a.json);
@@ -138,6 +160,11 @@ void add_replay(Subcommand app) {
                  "run this one beside it; errors against the log's truth");
   command.option("--set", a->beside.set,
                  "key=value: run this tuning beside it, e.g. noise or weights; may be repeated");
+  const Option shadow = command.flag(
+      "--shadow", a->shadow, "beside a robot that somebody else drove: alarms, NIS, tilt, prediction");
+  command.option("--config", a->config, "with --shadow: this robot, in place of the log's")
+      .file()
+      .needs(shadow);
   command.option("--json", a->json, "result as JSON, - for stdout").file();
   command.action([=] { return run(*a); });
 }

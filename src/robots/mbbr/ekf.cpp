@@ -139,6 +139,19 @@ void MbbrEkf::start(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Vec3&
   phi_.setZero();
 }
 
+void MbbrEkf::start_moving(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Mbbr::Sample& z) noexcept {
+  start(tilt, gyro_bias_B_rad_s, z.wheel_angle_rad);
+  Vec<18> x = filter_.x();
+  x.segment<3>(Model::kThetaDotX) = euler_rates(tilt, Vec3(z.gyro_B_rad_s - gyro_bias_B_rad_s));
+  x.segment<2>(Model::kPhiDotX) =
+      kinematics_.ball_from_wheels(z.wheel_rate_rad_s).head<2>() + x.segment<2>(Model::kThetaDotX);
+  filter_.reset(x);
+  // The gyro's noise on a robot that shakes; the slope of six samples, 12.5 ms old; the IMU's age.
+  filter_.widen(Model::kThetaDotX, 3, 0.1 * 0.1);
+  filter_.widen(Model::kPhiDotX, 2, 0.5 * 0.5);
+  filter_.widen(Model::kE, 3, 0.02 * 0.02);
+}
+
 void MbbrEkf::predict(const Vec3& u) noexcept {
   time_.advance(u);
   // [T] (6.3)-(6.4), over the tick that the filter leaves behind, by the mean of the rates at its ends.

@@ -76,6 +76,8 @@ class MbbrEkf {
 
   /// At rest: tilt from the averaged accelerometer, bias from the averaged gyro.
   void start(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Vec3& wheel_angle_rad) noexcept;
+  /// As start(), of a robot that moves as the sample says.
+  void start_moving(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Mbbr::Sample& z) noexcept;
   /// A tick without samples; `u` acted in it.
   void predict(const Vec3& u) noexcept;
   /// The samples at the end of the predicted tick.

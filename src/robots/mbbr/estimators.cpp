@@ -95,6 +95,15 @@ void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   attitude_heading_ = z.attitude_rad.z();
 }
 
+void MbbrEstimators::start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_rad_s,
+                                  const Mbbr::Sample& z) noexcept {
+  rest_bias_.tell(gyro_bias_B_rad_s);
+  start(z);
+  ekf_.start_moving(tilt_rad, gyro_bias_B_rad_s, z);
+  bias_drift_.reset(ekf_.x().segment<2>(MbbrEkfModel::kBiasX));
+  estimates_[index(Id::kEkf)] = ekf_.estimate();
+}
+
 /// Heading and inertial ball angles, [T] (6.3)-(6.4).
 void MbbrEstimators::integrate(Id id, double heading_rate) noexcept {
   MbbrEstimate& x = estimates_[index(id)];

@@ -54,6 +54,9 @@ class MbbrEstimators {
   /// `held`: motors off, the robot is not balancing.
   const MbbrEstimate& update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept;
 
+  /// The default filter of a robot that moves already; tilt and bias from elsewhere.
+  void start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_rad_s, const Mbbr::Sample& z) noexcept;
+
   bool runs(Id id) const noexcept { return id == params_.active || params_.compare; }
   const MbbrEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
   /// The default filter: rows, variances, predicted wheel rates.

@@ -83,6 +83,8 @@ class MipEkf {
 
   /// At rest: lean from the averaged accelerometer, bias from the averaged gyro.
   void start(double lean, const Vec3& gyro_bias_B_rad_s, const Vec2& wheel_angle_rad) noexcept;
+  /// As start(), of a robot that moves as the sample says.
+  void start_moving(double lean, const Vec3& gyro_bias_B_rad_s, const Mip::Sample& z) noexcept;
   /// A tick without samples; `u` acted in it.
   void predict(const Vec2& u) noexcept;
   /// The samples at the end of the predicted tick.

@@ -79,6 +79,15 @@ void MipEstimators::start(const Mip::Sample& z) noexcept {
   }
 }
 
+void MipEstimators::start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_rad_s,
+                                 const Mip::Sample& z) noexcept {
+  rest_bias_.tell(gyro_bias_B_rad_s);
+  start(z);
+  ekf_.start_moving(tilt_rad.x(), gyro_bias_B_rad_s, z);
+  bias_drift_.reset(ekf_.x().segment<1>(MipEkfModel::kGyroBias));
+  estimates_[index(Id::kEkf)] = ekf_.estimate();
+}
+
 void MipEstimators::from_wheels_and_gyro(Id id, const Mip::Sample& z) noexcept {
   MipEstimate& x = estimates_[index(id)];
   if (z.encoders_ok) {

@@ -63,6 +63,9 @@ class MipEstimators {
   /// `held`: motors off, the robot is not balancing.
   const MipEstimate& update(const Mip::Sample& z, const Vec2& u, bool held) noexcept;
 
+  /// The default filter of a robot that moves already; tilt and bias from elsewhere.
+  void start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_rad_s, const Mip::Sample& z) noexcept;
+
   bool runs(Id id) const noexcept { return id == params_.active || params_.compare; }
   const MipEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
   /// The default filter: rows, variances, predicted wheel rates.

@@ -1,0 +1,110 @@
+#include "app/log/shadow.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+#include "app/log/shadow_as.hpp"
+#include "app/text/errors.hpp"
+
+namespace equipoise::app {
+namespace {
+
+nlohmann::json number(double v) { return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(nullptr); }
+
+double mean_of(const std::vector<double>& v) {
+  if (v.empty()) return std::nan("");
+  return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
+}
+
+double variance_of(const std::vector<double>& v) {
+  const double mean = mean_of(v);
+  double sum = 0.0;
+  for (const double x : v) sum += (x - mean) * (x - mean);
+  return v.empty() ? std::nan("") : sum / static_cast<double>(v.size());
+}
+
+nlohmann::json to_json(const Ahead::Errors& e) {
+  return {{"tilt", number(e.tilt.value())}, {"wheel", number(e.wheel.value())}};
+}
+
+/// Of the axes that the robot has.
+double tilt_std_rad(const Shadow& s) {
+  RootMeanSquare all;
+  for (const std::vector<double>& axis : s.tilt_error_rad)
+    if (!axis.empty()) all.add(variance_of(axis));
+  return all.value();
+}
+
+}  // namespace
+
+double RootMeanSquare::value() const { return count > 0.0 ? std::sqrt(sum / count) : std::nan(""); }
+
+nlohmann::json Shadow::json() const {
+  nlohmann::json list = nlohmann::json::array();
+  for (const ShadowAlarm& a : alarms) {
+    list.push_back({{"t_s", a.t_s},
+                    {"hypothesis", a.hypothesis},
+                    {"ratio", number(a.ratio)},
+                    {"bound", number(a.bound)}});
+  }
+  nlohmann::json out{
+      {"judged_s", judged_s},
+      {"starts", starts},
+      {"alarms", list},
+      {"alarms_per_min", judged_s > 0.0 ? nlohmann::json(60.0 * static_cast<double>(alarms.size()) / judged_s)
+                                        : nlohmann::json(nullptr)},
+      {"tilt_std_rad", number(tilt_std_rad(*this))},
+      {"tilt_offset_rad", number(mean_of(tilt_error_rad[0]))},
+      {"tilt_std_own_rad", number(std::sqrt(variance_of(own_tilt_error_rad)))}};
+  for (const auto& [row, square] : nis) out["nis"][row] = number(square.sum / square.count);
+  for (const auto& [time, a] : ahead) {
+    out["ahead"][time] = to_json(a.model);
+    out["ahead"][time]["persistence"] = to_json(a.persistence);
+    out["ahead"][time]["constant_rate"] = to_json(a.constant_rate);
+  }
+  for (const auto& [channel, square] : noise) {
+    out["noise"][channel] = {{"log", number(square.value())}, {"configured", number(configured.at(channel))}};
+  }
+  return out;
+}
+
+void Shadow::print(std::FILE* out) const {
+  std::fprintf(out, "  judged %.2f s of balancing, %d starts, %zu alarms\n", judged_s, starts, alarms.size());
+  for (const ShadowAlarm& a : alarms) {
+    std::fprintf(out, "    %.3f s  %s", a.t_s, a.hypothesis.c_str());
+    if (std::isfinite(a.ratio)) std::fprintf(out, " (%.3g, limit %.3g)", a.ratio, a.bound);
+    std::fputc('\n', out);
+  }
+  if (judged_s == 0.0) return;
+  std::fprintf(out, "  NIS per row:");
+  for (const auto& [row, square] : nis)
+    std::fprintf(out, "  %s %.2f", row.c_str(), square.sum / square.count);
+  std::fprintf(out, "\n  tilt against the smoother %.2f mrad (constant offset of %.1f apart)\n",
+               1e3 * tilt_std_rad(*this), 1e3 * mean_of(tilt_error_rad[0]));
+  for (const auto& [time, a] : ahead) {
+    const auto line = [&](const char* what, double unit, RootMeanSquare Ahead::Errors::*of) {
+      std::fprintf(out, "  %5s ahead, %s: model %.2f, persistence %.2f, constant rate %.2f mrad\n",
+                   time.c_str(), what, unit * (a.model.*of).value(), unit * (a.persistence.*of).value(),
+                   unit * (a.constant_rate.*of).value());
+    };
+    line("tilt", 1e3, &Ahead::Errors::tilt);
+    line("wheels", 1e3, &Ahead::Errors::wheel);
+  }
+  for (const auto& [channel, square] : noise) {
+    std::fprintf(out, "  noise %-14s %.4f, world full %.4f\n", channel.c_str(), square.value(),
+                 configured.at(channel));
+  }
+}
+
+Shadow shadow_log(RunLog& log, const std::string& origin, const std::string& config,
+                  const std::vector<std::string>& set) {
+  if (!config.empty() && robot_type(config) != log.run().robot) {
+    throw InputError(config + ": is of a robot of type " + robot_type(config) + ", the log of " +
+                     log.run().robot);
+  }
+  return with_robot(log.run().robot, origin,
+                    [&](auto firmware) { return shadow_as<decltype(firmware)>(log, origin, config, set); });
+}
+
+}  // namespace equipoise::app

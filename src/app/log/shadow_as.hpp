@@ -1,0 +1,287 @@
+// The body of shadow_log(), for one robot. In: log -> out: Shadow. Included where a list of robots is at
+// hand.
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "app/log/shadow.hpp"
+#include "app/log/shadow_robots.hpp"
+#include "app/log/smoother.hpp"
+#include "app/trial/firmware.hpp"
+#include "equipoise/runtime/loop.hpp"
+
+namespace equipoise::app {
+
+/// What of a logged tick a shadow run needs.
+struct ShadowTick {
+  RawSample raw;
+  std::int64_t now_ns = 0;
+  std::array<double, 3> u{};  // voltage of the axes, until the next tick
+  double own_tilt_rad = 0.0;
+  bool armed = false;
+};
+
+inline std::vector<ShadowTick> shadow_ticks(RunLog& log) {
+  std::vector<ShadowTick> out;
+  for (runtime::TickRecord r; log.next(&r);) {
+    out.push_back({r.raw, r.now_ns, r.u_friction, r.estimate.theta_rad[0],
+                   r.arm_state == static_cast<std::int32_t>(ArmState::kArmed)});
+  }
+  return out;
+}
+
+/// Where one number decided, that number and its limit.
+template <class Health, class Estimate>
+void statistic(std::uint32_t reasons, const Health& h, const Estimate& x, const SafetyParams& p,
+               ShadowAlarm* alarm) {
+  alarm->ratio = alarm->bound = std::nan("");
+  const auto is = [&](double value, double limit) {
+    alarm->ratio = value;
+    alarm->bound = limit;
+  };
+  if ((reasons & kTilt) != 0) is(x.theta_rad.template head<2>().norm(), p.max_tilt_rad);
+  if ((reasons & kEstimatorUnhealthy) != 0) is(x.normalized_innovation, p.max_innovation);
+  if ((reasons & kEstimatorUnhealthy) != 0 && h.tilt_sigma_rad > p.max_tilt_sigma_rad)
+    is(h.tilt_sigma_rad, p.max_tilt_sigma_rad);
+  if ((reasons & kMotorFault) != 0) is(h.disturbance, p.max_disturbance);
+  if ((reasons & kImuUntrusted) != 0 && h.bias_drift_rad_s > p.max_bias_drift_rad_s)
+    is(h.bias_drift_rad_s, p.max_bias_drift_rad_s);
+}
+
+template <class P>
+class ShadowRun {
+ public:
+  using Robot = typename P::RobotType;
+  using Model = ShadowModel<Robot>;
+  using Motion = typename Model::Motion;
+  using Wheels = typename P::Wheels;
+  using Input = typename P::Input;
+
+  ShadowRun(const typename P::Params& params, double radius_m, double imu_height_m,
+            std::vector<ShadowTick> ticks)
+      : params_(of_shadow(params)),
+        radius_m_(radius_m),
+        imu_height_m_(imu_height_m),
+        ticks_(std::move(ticks)),
+        kinematics_(params.robot),
+        model_(params.estimators) {}
+
+  Shadow run() {
+    calibrate_all();
+    judged_.assign(ticks_.size(), false);
+    estimates_.resize(ticks_.size());
+    for (std::size_t k = 0; k < ticks_.size(); ++k) tick(k);
+    predict();
+    measure_noise();
+    return std::move(out_);
+  }
+
+ private:
+  static constexpr int kBefore = 20;   // ticks that the senses need before a start, and after a fault
+  static constexpr int kSettle = 100;  // ticks after a start that the tilt's error does not count
+  static constexpr std::uint32_t kNotOurs = kNotRequested | kCommandStale | kOverrun | kSaturated | kStall |
+                                            kBatteryLow | kNotCalibrated | kRealtimeMissing | kGuardDead;
+
+  /// Nothing that it asks of the motors happens, and friction takes its whole share of the log's voltage.
+  static typename P::Params of_shadow(typename P::Params p) {
+    p.safety.encoder_check_drive = p.safety.encoder_probe_drive = 0.0;
+    p.safety.max_saturated_s = p.safety.max_stall_s = 1e6;
+    p.friction.gain = 1.0;
+    return p;
+  }
+
+  void calibrate_all() {
+    std::vector<SmootherSample> samples;
+    for (const ShadowTick& t : ticks_) {
+      const auto z = calibrate<Robot::kWheels>(t.raw, params_.calibration, false);
+      samples.push_back({z.gyro_B_rad_s, -z.accel_B_m_s2, model_.rolling(z.wheel_angle_rad), z.imu_ok});
+    }
+    smoothed_ = smooth(samples, radius_m_, imu_height_m_);
+    samples_ = std::move(samples);
+  }
+
+  /// One logged tick as a hardware boundary.
+  struct Io {
+    const ShadowTick* now;
+    int wait_tick(std::int64_t* now_ns) noexcept {
+      *now_ns = now->now_ns;
+      return 0;
+    }
+    RawSample read() noexcept { return now->raw; }
+    int write(const MotorCommand& /*command*/) noexcept { return 0; }
+  };
+
+  Input net(const std::array<double, 3>& u, const Wheels& rates) const {
+    return Eigen::Map<const Input>(u.data()) - kinematics_.friction_input(params_.friction, rates);
+  }
+
+  void tick(std::size_t k) {
+    const ShadowTick& t = ticks_[k];
+    if (pipeline_ == nullptr) start(k);
+    const bool drives = seeded_ && t.armed;
+    if (!t.armed) seeded_ = false;
+    if (k > 0) pipeline_->applied(net(ticks_[k - 1].u, rates_), !drives);
+    typename P::Result result;
+    Command command;
+    command.arm = drives;
+    Io io{&t};
+    runtime::run_tick(
+        io, *pipeline_, [&](std::int64_t, std::int64_t) { return command; },
+        [&](std::int64_t, std::int64_t, const RawSample&, const Command&, const auto& r) { result = r; },
+        nobody_, &end_);
+    const auto health = pipeline_->estimators().health();
+    rates_ = health.predicts_wheels ? Wheels(health.wheel_rate_rad_s) : Wheels(result.z.wheel_rate_rad_s);
+    if (drives && result.arm_state == ArmState::kArmed) judge(k, result);
+    watch(k, result, health);
+    if (!seeded_ && t.armed && k >= from_ + kBefore) {
+      pipeline_->estimators().start_moving(smoothed_.tilt_rad[k], smoothed_.bias_rad_s[k], result.z);
+      seeded_ = true;
+      seeded_at_ = k;
+      ++out_.starts;
+    }
+    if (result.arm_state == ArmState::kFault) pipeline_.reset();
+  }
+
+  void start(std::size_t k) {
+    pipeline_ = std::make_unique<P>(params_);
+    seeded_ = false;
+    from_ = k;
+    reasons_ = degraded_ = 0;
+  }
+
+  template <class Result>
+  void judge(std::size_t k, const Result& t) {
+    judged_[k] = true;
+    out_.judged_s += kTickS;
+    estimates_[k] = {Model::start(t.x_hat, pipeline_->estimators().ekf()),
+                     Model::disturbance(pipeline_->estimators().ekf()), seeded_at_};
+    const auto& nis = pipeline_->estimators().ekf().row_nis();
+    for (std::size_t i = 0; i < nis.size(); ++i)
+      if (nis[i] > 0.0) out_.nis[Model::kRows[i]].add(nis[i]);
+    if (k < seeded_at_ + kSettle) return;
+    const Vec2 tilt = Model::tilt(estimates_[k].motion);
+    const Vec2 error = tilt - smoothed_.tilt_rad[k];
+    for (int i = 0; i < Model::kAxes; ++i)
+      out_.tilt_error_rad[static_cast<std::size_t>(i)].push_back(error(i));
+    if (std::isfinite(ticks_[k].own_tilt_rad))
+      out_.own_tilt_error_rad.push_back(tilt.x() - ticks_[k].own_tilt_rad);
+  }
+
+  /// What is new among reasons and degraded modes.
+  template <class Result, class Health>
+  void watch(std::size_t k, const Result& t, const Health& health) {
+    const bool fault = t.arm_state == ArmState::kFault;
+    const std::uint32_t reasons = fault ? t.reasons & ~kNotOurs : 0;
+    const std::uint32_t gaps = ticks_[k].raw.valid == 0 ? kWithoutImu | kWithoutEncoders : 0U;
+    const std::uint32_t degraded = t.degraded & ~gaps;
+    ShadowAlarm alarm;
+    alarm.t_s = 1e-9 * static_cast<double>(ticks_[k].now_ns);
+    const auto name = [&](const std::string& each) {
+      alarm.hypothesis += (alarm.hypothesis.empty() ? "" : "+") + each;
+    };
+    for_each_reason(reasons & ~reasons_, name);
+    for_each_degraded(degraded & ~degraded_, [&](const DegradedMode& mode) { name(mode.name); });
+    reasons_ = reasons;
+    degraded_ = degraded;
+    if (alarm.hypothesis.empty()) return;
+    statistic(reasons, health, view(t.x_hat, params_.robot), params_.safety, &alarm);
+    out_.alarms.push_back(alarm);
+  }
+
+  void predict() {
+    for (std::size_t k = 1; k < ticks_.size(); ++k) {
+      if (!judged_[k]) continue;
+      Motion m = estimates_[k].motion;
+      const Motion now = m;
+      Input disturbance = estimates_[k].disturbance;
+      const Vec2 rate = (smoothed_.tilt_rad[k] - smoothed_.tilt_rad[k - 1]) / kTickS;
+      for (std::size_t h = 1; h <= 20; ++h) {
+        const std::size_t then = k + h;
+        if (then >= ticks_.size() || !judged_[then] || estimates_[then].seeded_at != estimates_[k].seeded_at)
+          break;
+        m = model_.model.ahead(m, net(ticks_[then - 1].u, model_.wheel_rates(m)) + disturbance, kTickS);
+        disturbance *= model_.keep;
+        if (h != 1 && h != 20) continue;
+        Ahead& a = out_.ahead[h == 1 ? "5ms" : "100ms"];
+        const double dt = static_cast<double>(h) * kTickS;
+        const Vec2 tilt = smoothed_.tilt_rad[then] - smoothed_.tilt_rad[k];
+        const Vec2 rolled = samples_[then].rolling_rad - samples_[k].rolling_rad;
+        add(&a.model, Model::tilt(m) - Model::tilt(now) - tilt,
+            Model::rolled(m) - Model::rolled(now) - rolled);
+        add(&a.persistence, tilt, rolled);
+        add(&a.constant_rate, dt * rate - tilt, dt * Model::rolling_rate(now) - rolled);
+      }
+    }
+  }
+  static void add(Ahead::Errors* e, const Vec2& tilt, const Vec2& wheel) {
+    e->tilt.add(tilt.squaredNorm() / Model::kAxes);
+    e->wheel.add(wheel.squaredNorm() / Model::kAxes);
+  }
+
+  /// Of samples in a row: the second difference of white noise has six times its variance.
+  void measure_noise() {
+    constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+    for (std::size_t k = 2; k < ticks_.size(); ++k) {
+      if (!judged_[k] || !samples_[k].imu_ok || !samples_[k - 1].imu_ok || !samples_[k - 2].imu_ok) continue;
+      for (int i = 0; i < 3; ++i) {
+        const auto second = [&](auto field) {
+          return (samples_[k].*field)(i)-2.0 * (samples_[k - 1].*field)(i) + (samples_[k - 2].*field)(i);
+        };
+        const std::string axis = kNames[static_cast<std::size_t>(i)];
+        out_.noise["gyro_" + axis + "_rad_s"].add(std::pow(second(&SmootherSample::gyro_rad_s), 2) / 6.0);
+        out_.noise["accel_" + axis + "_m_s2"].add(std::pow(second(&SmootherSample::accel_m_s2), 2) / 6.0);
+      }
+    }
+  }
+
+  struct Estimated {
+    Motion motion;
+    Input disturbance;
+    std::size_t seeded_at = 0;
+  };
+
+  typename P::Params params_;
+  double radius_m_, imu_height_m_;
+  std::vector<ShadowTick> ticks_;
+  typename Robot::Kinematics kinematics_;
+  Model model_;
+  std::vector<SmootherSample> samples_;
+  Smoothed smoothed_;
+  std::vector<bool> judged_;
+  std::vector<Estimated> estimates_;
+  std::unique_ptr<P> pipeline_;
+  runtime::NoSupervisor nobody_;
+  runtime::LoopEnd end_;
+  bool seeded_ = false;
+  std::size_t seeded_at_ = 0, from_ = 0;
+  Wheels rates_ = Wheels::Zero();
+  std::uint32_t reasons_ = 0, degraded_ = 0;
+  Shadow out_;
+};
+
+template <class Firmware>
+Shadow shadow_as(RunLog& log, const std::string& origin, const std::string& path,
+                 const std::vector<std::string>& set) {
+  const runtime::RunInfo& info = log.run();
+  const auto loaded = path.empty() ? Firmware::parse(info.config_toml, origin + " (its configuration)", set)
+                                   : Firmware::load(path, set);
+  Choice choice{"", "", info.backend == "import" ? "" : info.fidelity, false, "", ""};
+  complete<Firmware>(choice);
+  const auto config = Firmware::apply(loaded.config, choice);
+  const auto& world = config.world[fidelity_level("full")].common;
+  Shadow out = Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    using P = std::decay_t<decltype(pipeline)>;
+    return ShadowRun<P>(pipeline.params(), Firmware::rolling_radius_m(config), config.robot.l_a.z(),
+                        shadow_ticks(log))
+        .run();
+  });
+  for (const char* axis : {"x", "y", "z"}) {
+    out.configured[std::string("gyro_") + axis + "_rad_s"] = world.gyro_sigma_rad_s;
+    out.configured[std::string("accel_") + axis + "_m_s2"] = world.accel_sigma_m_s2;
+  }
+  return out;
+}
+
+}  // namespace equipoise::app

@@ -1,0 +1,155 @@
+#include "app/log/smoother.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace equipoise::app {
+namespace {
+
+using State = Vec<6>;  // up in body axes, gyro bias
+using Matrix6 = Mat<6, 6>;
+
+constexpr double kGyroDensity =
+    kPi / 180.0 * 0.01;                  // rad/s per root Hz: MPU-6050 and 9250, 0.005 to 0.01 deg/s
+constexpr double kBiasWalk = 1e-4;       // rad/s per root second: a few hundredths of deg/s in a minute
+constexpr double kFirstBias = 0.1;       // rad/s, uncalibrated
+constexpr double kFirstYawBias = 0.005;  // gravity says nothing of it; taken off at rest
+constexpr double kRollingBand_Hz = 6.0;  // of the wheels' accelerations: encoders count in steps
+constexpr int kBlock = 100;              // ticks, longer than the body's vibration and sway
+
+Mat3 cross(const Vec3& v) {
+  Mat3 m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+/// First-order low-pass forwards and backwards: no lag.
+std::vector<Vec2> without_lag(std::vector<Vec2> x) {
+  const double share = 1.0 - std::exp(-2.0 * kPi * kRollingBand_Hz * kTickS);
+  for (std::size_t k = 1; k < x.size(); ++k) x[k] = x[k - 1] + share * (x[k] - x[k - 1]);
+  for (std::size_t k = x.size() - 1; k > 0; --k) x[k - 1] = x[k] + share * (x[k - 1] - x[k]);
+  return x;
+}
+
+std::vector<Vec2> slope(const std::vector<Vec2>& x) {
+  std::vector<Vec2> out(x.size(), Vec2::Zero());
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) out[k] = (x[k + 1] - x[k - 1]) / (2.0 * kTickS);
+  return out;
+}
+
+/// Specific force without what rolling and turning add at the IMU; the floor's plane, in axes that yaw along.
+std::vector<Vec3> felt_gravity(const std::vector<SmootherSample>& s, double radius_m, double imu_height_m) {
+  std::vector<Vec2> rolling;
+  std::vector<Vec2> rate;
+  for (const SmootherSample& each : s) {
+    rolling.push_back(each.rolling_rad);
+    rate.push_back(each.gyro_rad_s.head<2>());
+  }
+  rate = without_lag(rate);
+  const std::vector<Vec2> turn = slope(rate);
+  std::vector<Vec2> velocity = slope(without_lag(without_lag(rolling)));
+  for (std::size_t k = 0; k < s.size(); ++k) {
+    const Vec2 turned = velocity[k] + rate[k];
+    velocity[k] = radius_m * Vec2(turned.y(), -turned.x());
+  }
+  const std::vector<Vec2> change = slope(velocity);
+  std::vector<Vec3> out;
+  for (std::size_t k = 0; k < s.size(); ++k) {
+    const double yaw = s[k].gyro_rad_s.z();
+    const Vec2 axle = change[k] + yaw * Vec2(-velocity[k].y(), velocity[k].x());
+    const Vec2 lever = Vec2(turn[k].y(), -turn[k].x()) + yaw * rate[k];
+    const Vec2 felt = axle + imu_height_m * lever;
+    out.push_back(s[k].accel_m_s2 - Vec3(felt.x(), felt.y(), 0.0));
+  }
+  return out;
+}
+
+struct Step {
+  State x_predicted, x;
+  Matrix6 P_predicted, P, F;
+};
+
+std::vector<State> pass(const std::vector<SmootherSample>& s, const std::vector<Vec3>& gravity,
+                        double variance) {
+  std::vector<Step> steps(s.size());
+  State x = State::Zero();
+  Vec3 first = Vec3::Zero();
+  for (std::size_t k = 0; k < std::min<std::size_t>(s.size(), kBlock); ++k) first += gravity[k];
+  x.head<3>() = first.norm() > 0.0 ? Vec3(first.normalized()) : Vec3(Vec3::UnitZ());
+  Matrix6 P = Matrix6::Zero();
+  P.diagonal() << 0.1, 0.1, 0.1, Vec3(kFirstBias, kFirstBias, kFirstYawBias).cwiseAbs2();
+  Matrix6 Q = Matrix6::Zero();
+  Q.diagonal() << Vec3::Constant(kGyroDensity * kGyroDensity * kTickS),
+      Vec3::Constant(kBiasWalk * kBiasWalk * kTickS);
+  Vec3 gyro = s.front().gyro_rad_s;
+  for (std::size_t k = 0; k < s.size(); ++k) {
+    Step& step = steps[k];
+    const Vec3 before = gyro;
+    if (s[k].imu_ok) gyro = s[k].gyro_rad_s;
+    const Vec3 rate = 0.5 * (before + gyro) - x.tail<3>();
+    step.F.setIdentity();
+    if (k > 0) {
+      step.F.topLeftCorner<3, 3>() =
+          Eigen::AngleAxisd(-kTickS * rate.norm(), rate.stableNormalized()).toRotationMatrix();
+      step.F.topRightCorner<3, 3>() = -kTickS * cross(x.head<3>());
+      x.head<3>() = step.F.topLeftCorner<3, 3>() * x.head<3>();
+      P = step.F * P * step.F.transpose() + Q;
+    }
+    step.x_predicted = x;
+    step.P_predicted = P;
+    if (s[k].imu_ok) {
+      const Mat3 S = kGravity_m_s2 * kGravity_m_s2 * P.topLeftCorner<3, 3>() + variance * Mat3::Identity();
+      const Mat<6, 3> K = kGravity_m_s2 * P.leftCols<3>() * S.inverse();
+      x += K * (gravity[k] - kGravity_m_s2 * x.head<3>());
+      P -= kGravity_m_s2 * K * P.topRows<3>();
+      P = 0.5 * (P + P.transpose().eval());
+    }
+    step.x = x;
+    step.P = P;
+  }
+  std::vector<State> out(s.size());
+  out.back() = steps.back().x;
+  for (std::size_t k = s.size() - 1; k > 0; --k) {
+    const Step& step = steps[k - 1];
+    const Step& next = steps[k];
+    const Matrix6 gain = step.P * next.F.transpose() * next.P_predicted.inverse();
+    out[k - 1] = step.x + gain * (out[k] - next.x_predicted);
+  }
+  return out;
+}
+
+/// What one sample's white noise would have to be to make the means of blocks as uncertain as they are.
+double variance_of(const std::vector<Vec3>& gravity, const std::vector<State>& x) {
+  double sum = 0.0;
+  int blocks = 0;
+  for (std::size_t k = 0; k + kBlock <= x.size(); k += kBlock) {
+    Vec3 mean = Vec3::Zero();
+    for (std::size_t i = k; i < k + kBlock; ++i)
+      mean += (gravity[i] - kGravity_m_s2 * x[i].head<3>()) / kBlock;
+    sum += mean.head<2>().squaredNorm() / 2.0;
+    ++blocks;
+  }
+  constexpr double kFirst = 1.0;  // 0.1 m/s2 over a block of half a second
+  return blocks < 3 ? kFirst : std::max(kBlock * sum / blocks, 1e-4);
+}
+
+}  // namespace
+
+Smoothed smooth(const std::vector<SmootherSample>& samples, double radius_m, double imu_height_m) {
+  const std::vector<Vec3> gravity = felt_gravity(samples, radius_m, imu_height_m);
+  double variance = 1.0;
+  std::vector<State> x;
+  for (int i = 0; i < 3; ++i) {
+    x = pass(samples, gravity, variance);
+    variance = variance_of(gravity, x);
+  }
+  Smoothed out;
+  for (const State& each : x) {
+    out.tilt_rad.emplace_back(std::atan2(each.y(), each.z()),
+                              -std::atan2(each.x(), std::hypot(each.y(), each.z())));
+    out.bias_rad_s.emplace_back(each.tail<3>());
+  }
+  return out;
+}
+
+}  // namespace equipoise::app
