@@ -56,8 +56,7 @@ TEST(RestBias, MoreThanTheSensorCanHaveIsNoBias) {
 /// A hand that turns the body by 0.1 rad at 1 Hz: 0.6 rad/s.
 TEST(RestBias, TurningByHandIsNoRest) {
   RestBias bias;
-  for (int i = 0; i < 1000; ++i)
-    bias.update(kBias + Vec3(0.0, 0.0, 0.6 * std::cos(2.0 * kPi * i * kTickS)));
+  for (int i = 0; i < 1000; ++i) bias.update(kBias + Vec3(0.0, 0.0, 0.6 * std::cos(2.0 * kPi * i * kTickS)));
   EXPECT_FALSE(bias.known());
 }
 

@@ -1,0 +1,199 @@
+"""import and replay --shadow: a foreign table as a log, its mistakes by name, the firmware beside it."""
+
+import io
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from equipoise_robot import Log
+from equipoise_tools.experiments.runs import binary
+from scipy.io import savemat
+
+import lcm
+
+# The chip's axes: body x, z, -y; the board stands upright.
+COLUMNS = {
+    "gyro": ["gx", "gy", "gz"],
+    "accel": ["ax", "ay", "az"],
+    "wheels": ["e0", "e1"],
+    "drive": ["d0", "d1"],
+}
+UNITS = {"gyro": "deg/s", "accel": "g", "wheels": "rad"}
+SAMPLES = {f"sensors.{a}_counts_{i}": f"{a[0]}{'xyz'[i]}" for a in ("gyro", "accel") for i in range(3)}
+
+
+def run(*arguments, status=0):
+    command = [str(binary()), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stderr
+    return done
+
+
+def write_map(path, robot, time="column", **changes):
+    columns, units = COLUMNS | changes.get("columns", {}), UNITS | changes.get("units", {})
+    axes = {name: json.dumps(names) for name, names in columns.items()}
+    path.write_text(
+        f'robot = "{robot}"\n[time]\n{time} = "t"\nunit = "s"\n[[balancing]]\nfrom_s = 0.5\nto_s = 30\n'
+        f'[gyro]\naxes = {axes["gyro"]}\nunit = "{units["gyro"]}"\n'
+        f'[accel]\naxes = {axes["accel"]}\nunit = "{units["accel"]}"\n'
+        f'[wheels]\nkind = "angle"\naxes = {axes["wheels"]}\nunit = "{units["wheels"]}"\n'
+        f'[drive]\nkind = "duty"\naxes = {axes["drive"]}\nunit = "1"\n[battery]\ncolumn = "v"\nunit = "V"\n'
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def table(root, tmp_path_factory):
+    """20 s of the simulated eduMIP, driving, turning and pushed, as somebody else's CSV."""
+    folder = tmp_path_factory.mktemp("foreign")
+    log = folder / "sim.lcm"
+    pushes = ", ".join(f"{{at_s={t}, duration_s=0.05, force_N=[0.0, 1.0]}}" for t in range(3, 18, 2))
+    run("sim", "--config", root / "config/edumip.toml", "--fidelity", "nominal", "--duration-s", 20,
+        "--yaw-hz", 0.3, "--drive-mps", 0.1, "--telemetry", "off", "--log", log,
+        "--set", f"world.nominal.pushes=[{pushes}]")  # fmt: skip
+    run("convert", log, "--to", "csv")
+    ours = pd.read_csv(log.with_suffix(".csv"))
+    out = ours[list(SAMPLES)].rename(columns=SAMPLES)
+    out[["gx", "gy", "gz"]] /= 16.4
+    out[["ax", "ay", "az"]] /= 4096
+    out.insert(0, "t", ours["t_s"])
+    for i in range(2):
+        out[f"e{i}"] = ours[f"sensors.encoder_counts_{i}"] * 2 * np.pi / 2134.62
+        out[f"d{i}"] = ours[f"motors.duty_{i}"]
+    out["v"] = ours["health.battery_V"]
+    out.to_csv(folder / "theirs.csv", index=False)
+    return folder / "theirs.csv"
+
+
+def checks(table, map_file):
+    log = table.with_suffix(".lcm")
+    done = run("import", table, "--map", map_file, "-o", log, "--json", "-")
+    out = json.loads(done.stdout)  # nothing else on stdout
+    return out | {"log": log, "by_name": {c["name"]: c for c in out["checks"]}}
+
+
+def test_a_table_becomes_a_log_that_everything_reads(root, table, tmp_path):
+    out = checks(table, write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
+    assert out["checks_failed"] == []
+    told = [name for name, c in out["by_name"].items() if c["ok"]]
+    assert {"gyro_x_accel", "wheels_accel", "drive_wheels", "gyro_z_wheels"} <= set(told)
+    log = Log(out["log"])
+    original = Log(table.parent / "sim.lcm")
+    assert len(log.sensors()) == len(original.sensors())
+    np.testing.assert_allclose(log.sensors()["gyro_B_rad_s"], original.sensors()["gyro_B_rad_s"], atol=1e-9)
+    assert log.run.config_toml == original.run.config_toml
+    channels = {event.channel for event in lcm.EventLog(str(out["log"]))}
+    assert {"EQUIPOISE_RUN", "EQUIPOISE_SENSORS", "EQUIPOISE_MOTORS"} <= channels
+    run("convert", out["log"], "--to", "mcap", "--out", tmp_path / "a.mcap")
+    assert "--shadow" in run("replay", out["log"], status=2).stderr
+
+
+@pytest.mark.parametrize(
+    ("changes", "check", "named"),
+    [
+        ({"units": {"gyro": "rad/s"}}, "gyro_z_wheels", "gyro.unit is deg/s, not rad/s"),
+        ({"units": {"accel": "m/s2"}}, "accel_norm", "accel.unit is g, not m/s2"),
+        ({"units": {"wheels": "deg"}}, "drive_wheels", "wheels.unit is wrong"),
+        ({"columns": {"gyro": ["-gx", "gy", "gz"]}}, "gyro_x_accel", "gyro x is flipped"),
+        ({"columns": {"gyro": ["gx", "-gy", "gz"]}}, "gyro_z_wheels", "gyro z is flipped"),
+        ({"columns": {"accel": ["ax", "ay", "-az"]}}, "gyro_x_accel", "accel y is flipped"),
+        ({"columns": {"accel": ["ax", "-ay", "az"]}}, "accel_up", "accel z is flipped"),
+        ({"columns": {"wheels": ["e1", "e0"]}}, "gyro_z_wheels", "the wheels are swapped"),
+        ({"columns": {"drive": ["d1", "d0"]}}, "drive_wheels_turn", "the drive's columns are swapped"),
+        ({"columns": {"drive": ["-d0", "-d1"]}}, "drive_wheels", "the sign of drive or wheels is flipped"),
+    ],
+)
+def test_a_mistake_in_the_map_is_named(root, table, tmp_path, changes, check, named):
+    out = checks(table, write_map(tmp_path / "map.toml", root / "config/edumip.toml", **changes))
+    assert check in out["checks_failed"]
+    assert named in out["by_name"][check]["text"]
+
+
+def test_shadow_of_a_healthy_run_is_quiet_and_of_a_scaled_gyro_is_not(root, table, tmp_path):
+    out = checks(table, write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
+    healthy = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
+    assert healthy["judged_s"] > 18
+    assert healthy["alarms"] == [] and healthy["alarms_per_min"] == 0
+    assert healthy["tilt_std_rad"] < 0.008  # pushes shift the smoother, too
+    for ahead in healthy["ahead"].values():
+        assert ahead["wheel"] < ahead["persistence"]["wheel"]
+    assert set(healthy["nis"]) == {"gyro_x", "gyro_y", "gyro_z", "wheel_1", "wheel_2", "accel_y"}
+    wrong = pd.read_csv(table)
+    wrong.loc[wrong.t > 10, "gx"] *= -1
+    wrong.to_csv(tmp_path / "wrong.csv", index=False)
+    out = checks(tmp_path / "wrong.csv", tmp_path / "map.toml")
+    faulty = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
+    assert any(10 < alarm["t_s"] < 11 for alarm in faulty["alarms"])
+
+
+def test_shadow_runs_on_our_own_logs_of_both_robots(root, tmp_path):
+    log = tmp_path / "ball.lcm"
+    run("sim", "--config", root / "config/mbbr.toml", "--duration-s", 8, "--yaw-hz", 1, "--drive-mps", 0.1,
+        "--telemetry", "off", "--log", log)  # fmt: skip
+    out = json.loads(run("replay", log, "--shadow", "--json", "-").stdout)
+    assert out["judged_s"] > 7 and out["alarms"] == []
+    assert out["tilt_std_rad"] < 0.005
+    assert out["ahead"]["100ms"]["wheel"] < out["ahead"]["100ms"]["persistence"]["wheel"]
+    other = run("replay", log, "--shadow", "--config", root / "config/edumip.toml", status=2)
+    assert "robot of type mip, the log of mbbr" in other.stderr
+
+
+def test_errors_name_the_key_and_the_fix(root, table, tmp_path):
+    good = write_map(tmp_path / "map.toml", root / "config/edumip.toml")
+    bad = tmp_path / "bad.toml"
+    bad.write_text(good.read_text().replace('"gx"', '"gyro"'))
+    assert 'no column "gyro"' in run("import", table, "--map", bad, "-o", tmp_path / "a.lcm", status=2).stderr
+    bad.write_text(good.read_text().replace('unit = "deg/s"', 'unit = "dps"'))
+    assert "gyro.unit" in run("import", table, "--map", bad, "-o", tmp_path / "a.lcm", status=2).stderr
+    matlab = tmp_path / "a.mat"
+    matlab.write_bytes(b"MATLAB 5.0")
+    assert "./tools/table" in run("import", matlab, "--map", good, "-o", tmp_path / "a.lcm", status=2).stderr
+
+
+def test_binary_tables_become_csv(tmp_path):
+    t = np.arange(5.0)
+    content = {"data": {"time": t, "values": np.column_stack([t, -t])}, "note": "x", "short": np.arange(3.0)}
+    savemat(tmp_path / "a.mat", content)
+    pd.DataFrame({"t": t, "u": 2 * t}).to_parquet(tmp_path / "a.parquet")
+
+    def table(name, status=0):
+        command = [sys.executable, "-m", "equipoise_tools.table", str(tmp_path / name)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stderr
+        return done
+
+    done = table("a.mat")
+    written = pd.read_csv(io.StringIO(done.stdout))
+    assert list(written) == ["data.time", "data.values_1", "data.values_2"]
+    np.testing.assert_array_equal(written["data.values_2"], -t)
+    assert "short has 3 values, not 5" in done.stderr
+    assert list(pd.read_csv(io.StringIO(table("a.parquet").stdout))) == ["t", "u"]
+    assert "there is no such file" in table("gone.mat", 2).stderr
+    (tmp_path / "a.xlsx").touch()
+    assert "is none of .mat" in table("a.xlsx", 2).stderr
+
+
+# Real logs: of the folder beside the project, where there is one.
+REAL = {
+    "mini_segway_log278": "pichim+Mini_Segway/docs/matlab/LOG278.TXT",
+    "regbot_bal_log_2": "SebastianBitsch+robobot-project/regbot/matlab/mekanisk/b1/bal_log_2.txt",
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_logs_pass_their_checks(root, tmp_path, name):
+    table = root.parent / "shared/real" / REAL[name]
+    if not table.exists():
+        pytest.skip(f"no {table.name}: docs/reality.md says where it is from")
+    log = tmp_path / "real.lcm"
+    map_file = root / f"config/real/maps/{name}.toml"
+    out = json.loads(run("import", table, "--map", map_file, "-o", log, "--json", "-").stdout)
+    assert not {"gyro_x_accel", "wheels_accel", "drive_wheels", "gyro_z_wheels", "accel_up"} & set(
+        out["checks_failed"]
+    )
+    shadow = json.loads(run("replay", log, "--shadow", "--json", "-").stdout)
+    assert shadow["judged_s"] > 1
+    assert shadow["ahead"]["100ms"]["wheel"] < shadow["ahead"]["100ms"]["persistence"]["wheel"]

@@ -1,0 +1,171 @@
+"""What the firmware would have done beside real robots: docs/reality.md from their logs; tools/reality."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from .entry import leave
+from .paths import repository_root
+
+MAPS = Path("config/real/maps")
+PAGE, DATA = Path("docs/reality.md"), Path("docs/reality.json")
+START = "<!-- tables: ./tools/reality FOLDER --write -->\n"
+
+
+def found(folder: Path, source: dict[str, str]) -> Path | None:
+    """The log a map is for, if it is there and the same."""
+    owner, name = source["repository"].split("/")
+    for repository in (f"{owner}+{name}", f"{owner}/{name}", name):
+        path = folder / repository / source["path"]
+        if path.is_file():
+            if hashlib.sha256(path.read_bytes()).hexdigest() == source["sha256"]:
+                return path
+            print(f"{path}: is another version than commit {source['commit']} has", file=sys.stderr)
+    return None
+
+
+def measured(root: Path, table: Path, map_file: Path) -> dict[str, Any]:
+    def run(*arguments: str | Path) -> dict[str, Any]:
+        command = [str(root / "build/host/equipoise"), *map(str, arguments), "--json", "-"]
+        done = subprocess.run(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True, cwd=root
+        )
+        result: dict[str, Any] = json.loads(done.stdout)
+        return result
+
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log.lcm"
+        checks = run("import", table, "--map", map_file, "-o", log)
+        return {"checks_failed": checks["checks_failed"], **run("replay", log, "--shadow")}
+
+
+def shown(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
+    return "-" if value is None else f"{scale * value:.{digits}f}"
+
+
+def pair(before: dict[str, Any] | None, now: dict[str, Any], text) -> str:
+    return f"{text(before) if before else '-'} -> {text(now)}"
+
+
+def causes(shadow: dict[str, Any]) -> str:
+    alarms = shadow["alarms"]
+    if not alarms:
+        return "0"
+    return f"{len(alarms)}: " + ", ".join(f"{a['hypothesis']} at {a['t_s']:.2f} s" for a in alarms[:4])
+
+
+def nis(shadow: dict[str, Any]) -> str:
+    values = shadow.get("nis", {}).values()
+    return f"{min(values):.2f} to {max(values):.2f}" if values else "-"
+
+
+def ahead(shadow: dict[str, Any], what: str) -> str:
+    if "ahead" not in shadow or "100ms" not in shadow["ahead"]:
+        return "-"
+    a = shadow["ahead"]["100ms"]
+    return " / ".join(shown(x[what], 1e3, 1) for x in (a, a["persistence"], a["constant_rate"]))
+
+
+def noise(shadow: dict[str, Any], sensor: str) -> str:
+    axes = [v for name, v in shadow.get("noise", {}).items() if name.startswith(sensor)]
+    if not axes:
+        return "-"
+    return " ".join(shown(v["log"], 1, 3) for v in axes) + f" (world: {shown(axes[0]['configured'], 1, 3)})"
+
+
+def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
+    now, before = data["now"], data["before"]
+    rows = [
+        "| log | balancing, s | alarms | NIS per row, least to largest | tilt against smoother, mrad |",
+        "|---|---|---|---|---|",
+    ]
+    ahead_rows = ["| log | tilt | wheels |", "|---|---|---|"]
+    noise_rows = ["| log | gyro x y z, rad/s | accelerometer x y z, m/s2 |", "|---|---|---|"]
+    origin = ["| log | repository, commit | path | licence | sha256 |", "|---|---|---|---|---|"]
+    for name, s in now.items():
+        b = before.get(name)
+        tilt = pair(b, s, lambda x: shown(x["tilt_std_rad"], 1e3, 1))
+        rows.append(f"| {name} | {s['judged_s']:.1f} | {pair(b, s, causes)} | {pair(b, s, nis)} | {tilt} |")
+        ahead_rows.append(
+            f"| {name} | "
+            + " | ".join(pair(b, s, lambda x, w=w: ahead(x, w)) for w in ("tilt", "wheel"))
+            + " |"
+        )
+        noise_rows.append(f"| {name} | {noise(s, 'gyro')} | {noise(s, 'accel')} |")
+    for name, content in maps.items():
+        source = content["source"]
+        origin.append(
+            f"| {name} | [{source['repository']}](https://github.com/{source['repository']}) "
+            f"{source['commit']} | `{source['path']}` | {source['licence']} | `{source['sha256'][:16]}` |"
+        )
+    return "\n".join(
+        [
+            f"Firmware {data['version']} (earlier: {data['before_version'] or '-'}); earlier -> now.\n",
+            *rows,
+            "\n0.1 s ahead, error (RMS, mrad): model / persistence / constant rate.\n",
+            *ahead_rows,
+            "\nNoise of the samples while balancing (second differences, as white noise).\n",
+            *noise_rows,
+            "\n## Origin\n",
+            *origin,
+            "",
+        ]
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="tools/reality", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--before", action="store_true")
+    parser.add_argument("--write", action="store_true")
+    arguments = parser.parse_args()
+    root = repository_root()
+    data_file = root / DATA
+    data = (
+        json.loads(data_file.read_text())
+        if data_file.exists()
+        else {"before": {}, "now": {}, "before_version": None}
+    )
+    files = sorted((root / MAPS).glob("*.toml"))
+    maps = {file.stem: tomllib.loads(file.read_text()) for file in files}
+    done = {}
+    for file in files:
+        table = found(arguments.folder.resolve(), maps[file.stem]["source"])
+        if table is None:
+            print(f"{file.stem}: not in {arguments.folder}", file=sys.stderr)
+            continue
+        print(f"{file.stem} ...", file=sys.stderr)
+        done[file.stem] = measured(root, table, file)
+    if not done:
+        print(f"{arguments.folder}: holds none of the logs of docs/reality.md", file=sys.stderr)
+        return 1
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=root, capture_output=True, text=True, check=False
+    )
+    data["version"] = commit.stdout.strip() or next(iter(done.values()))["version"]
+    data["now"] |= done
+    if arguments.before:
+        data["before"], data["before_version"] = dict(data["now"]), data["version"]
+    for shadow in done.values():
+        for key in ("log", "config", "version"):
+            shadow.pop(key, None)
+    page = tables(data, maps)
+    if not arguments.write:
+        print(page)
+        return 0
+    data_file.write_text(json.dumps(data, indent=1, sort_keys=True) + "\n")
+    text = (root / PAGE).read_text()
+    (root / PAGE).write_text(text[: text.index(START)] + START + "\n" + page)
+    return 0
+
+
+if __name__ == "__main__":
+    leave(main)
