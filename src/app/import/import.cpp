@@ -5,6 +5,7 @@
 
 #include "app/text/errors.hpp"
 #include "app/trial/firmware.hpp"
+#include "robots/robot_list.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -149,8 +150,9 @@ ImportedRobot imported_robot(const std::string& path) {
     using Firmware = decltype(firmware);
     using Robot = typename Firmware::Robot;
     const auto loaded = Firmware::load(path, {});
+    const auto configured = load_robot(path, {});
     Choice choice;
-    complete<Firmware>(choice);
+    complete(*configured->type, &choice);
     const typename Robot::Kinematics kinematics(loaded.config.robot);
     const auto wheels = [](const WheelValues& w) {
       return Vec<Robot::kWheels>(Eigen::Map<const Vec<Robot::kWheels>>(w.data()));
@@ -159,7 +161,7 @@ ImportedRobot imported_robot(const std::string& path) {
     robot.wheels = Robot::kWheels;
     robot.calibration = loaded.config.calibration;
     robot.motor = loaded.config.motor;
-    robot.run = run_info<Firmware>(loaded, choice, 0);
+    robot.run = run_info(*configured, choice, 0);
     robot.run.backend = "import";
     robot.rolling_radius_m = robot.run.rolling_radius_m;
     robot.input = [=](const WheelValues& w) {
@@ -263,14 +265,14 @@ std::vector<runtime::TickRecord> imported_ticks(const ImportedRows& rows, const 
     first = false;
     r.arm = balances(map, now_s);
     r.arm_state = static_cast<std::int32_t>(r.arm ? ArmState::kArmed : ArmState::kDisarmed);
-    r.enable = r.arm;
+    r.motors.enable = r.arm;
     r.estimate.theta_rad[0] = rows.tilt_rad[newest];
     r.battery_V = rows.battery_V[newest];
-    r.motors = robot.wheels;
+    r.motor_count = robot.wheels;
     WheelValues u{};
     for (std::size_t i = 0; i < drive.size(); ++i) {
       u[i] = drive[i].mean(now_s - map.drive.delay_s, now_s + kTickS - map.drive.delay_s);
-      r.duty[i] = robot.calibration.motor_sign[i] * u[i] * robot.motor.nominal_V / r.battery_V;
+      r.motors.duty[i] = robot.calibration.motor_sign[i] * u[i] * robot.motor.nominal_V / r.battery_V;
     }
     r.u_friction = robot.input(u);
     r.u_lin = r.u_friction;

@@ -6,6 +6,7 @@
 
 #include "app/log/shadow_as.hpp"
 #include "app/text/errors.hpp"
+#include "robots/robot_list.hpp"
 
 namespace equipoise::app {
 namespace {

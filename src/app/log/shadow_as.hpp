@@ -9,7 +9,8 @@
 #include "app/log/shadow.hpp"
 #include "app/log/shadow_robots.hpp"
 #include "app/log/smoother.hpp"
-#include "app/trial/firmware.hpp"
+#include "app/text/reasons.hpp"
+#include "app/trial/firmware_of.hpp"
 #include "equipoise/runtime/loop.hpp"
 
 namespace equipoise::app {
@@ -181,8 +182,8 @@ class ShadowRun {
     const auto name = [&](const std::string& each) {
       alarm.hypothesis += (alarm.hypothesis.empty() ? "" : "+") + each;
     };
-    for_each_reason(reasons & ~reasons_, name);
-    for_each_degraded(degraded & ~degraded_, [&](const DegradedMode& mode) { name(mode.name); });
+    for (const std::string& each : reason_names(reasons & ~reasons_)) name(each);
+    for (const std::string& each : degraded_names(degraded & ~degraded_)) name(each);
     reasons_ = reasons;
     degraded_ = degraded;
     if (alarm.hypothesis.empty()) return;
@@ -268,7 +269,7 @@ Shadow shadow_as(RunLog& log, const std::string& origin, const std::string& path
   const auto loaded = path.empty() ? Firmware::parse(info.config_toml, origin + " (its configuration)", set)
                                    : Firmware::load(path, set);
   Choice choice{"", "", info.backend == "import" ? "" : info.fidelity, false, "", ""};
-  complete<Firmware>(choice);
+  complete(type_as<Firmware>(), &choice);
   const auto config = Firmware::apply(loaded.config, choice);
   const auto& world = config.world[fidelity_level("full")].common;
   Shadow out = Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
