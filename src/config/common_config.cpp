@@ -116,6 +116,11 @@ SafetyParams read_safety(Section s) {
   return p;
 }
 
+Precision read_precision(Section& s) {
+  if (!s.has("precision")) return Precision::kDouble;  // logs before it
+  return s.choice("precision", {"single", "double"}) == 0 ? Precision::kSingle : Precision::kDouble;
+}
+
 Chain read_chain(Section s) {
   Chain c;
   c.gyro_delay_s = s.number("gyro_delay_s", 0.0, 0.01);  // two ticks: the filter's memory

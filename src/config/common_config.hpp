@@ -10,6 +10,7 @@
 #include "equipoise/control/chain.hpp"
 #include "equipoise/control/governor.hpp"
 #include "equipoise/estimate/kalman.hpp"
+#include "equipoise/estimate/lanes.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/sense/attitude_filter.hpp"
 #include "equipoise/sense/calibrate.hpp"
@@ -32,6 +33,7 @@ MotorParameters read_motor(Section s);
 Calibration read_calibration(Section s, int wheels);
 SafetyParams read_safety(Section s);
 Chain read_chain(Section s);
+Precision read_precision(Section& s);
 /// Of our own filter; `imu_position_m`: lever arm.
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m);
 /// What of a world only one robot has.

@@ -118,10 +118,10 @@ def _kept(filter: Filter) -> list[str]:
     lines = ["    // By prepare():"]
     for name in ("ahead", "predict", "correct"):
         code = getattr(filter, name).lines()
-        if code.values:
-            lines.append(f"    double {name}[{code.values}];")
         if code.pairs:
-            lines.append(f"    Pair {name}_pairs[{code.pairs}];")
+            lines.append(f"    alignas(2 * sizeof(Real)) Real {name}_pairs[{2 * code.pairs}];")
+        if code.values:
+            lines.append(f"    Real {name}[{code.values}];")
     return lines
 
 
@@ -133,9 +133,51 @@ def _file(filter: Filter, suffix: str, about: list[str], includes: list[str], bo
     return text.replace("#pragma once\n", "\n".join([*once, *includes, ""]), 1)
 
 
+def _steps(filter: Filter) -> dict[str, list[tuple[str, str]]]:
+    """Of every step, what it takes: type and name."""
+    n, m, p = len(filter.states), filter.outputs, filter.inputs
+    return {
+        "ahead": [("const Real", f"u[{p}]"), ("Real", "dt"), ("Real", f"x[{filter.motion}]")],
+        "predict": [("const Real", f"u[{p}]"), ("Real", f"x[{n}]"), ("Real*", "P")],
+        "correct": [
+            ("const Real", f"u[{p}]"),
+            ("const Real", f"y[{m}]"),
+            ("const bool", f"use[{m}]"),
+            ("Real", f"x[{n}]"),
+            ("const Real*", "P"),
+            ("Real*", "Ph"),
+            ("Real", f"weight[{m}]"),
+            ("Real", f"row_innovation[{m}]"),
+            ("Real", f"row_nis[{m}]"),
+        ],
+    }
+
+
+def _declaration(name: str, takes: list[tuple[str, str]], real: str, indent: int = 2) -> list[str]:
+    takes = [("const Constants<Real>&", "k"), *takes]
+    text = ", ".join(f"{kind} {what}".replace("Real", real) for kind, what in takes)
+    return emit.statement(f"void {name}({text}) noexcept", indent)
+
+
 def render(filter: Filter) -> str:
     n, m, p = len(filter.states), filter.outputs, filter.inputs
     name = filter.robot.capitalize()
+    about = {
+        "ahead": ["x after dt with what acts, input and disturbance."],
+        "predict": ["x, P after a tick with input u."],
+        "correct": [
+            "x after the samples y, of which those count whose flag is set, and what P loses: the sum of",
+            f"weight Ph Ph' over the rows. Ph[{n // 2}][{m}][2]: pairs of states, rows, state of the pair.",
+            "row_nis: squared innovation over its variance; 0 where not used, like the other two.",
+        ],
+    }
+    steps: list[str] = []
+    for step, takes in _steps(filter).items():
+        steps += [f"  /// {line}" for line in about[step]]
+        for real in ("double", "float"):
+            first, *rest = _declaration(step, takes, real)
+            steps += [first.replace("void", "static void", 1), *rest]
+            steps[-1] += ";"
     body = [
         f"struct {name}Filter {{",
         f"  static constexpr int kStates = {n};",
@@ -150,72 +192,55 @@ def render(filter: Filter) -> str:
         *_places("kB", "Entries of B: state, input", filter.B),
         *_places("kQ", "Entries of Q: row, column", filter.noise),
         "",
+        "  /// Nothing but numbers, all of one type.",
+        "  template <class Real>",
         "  struct Constants {",
-        f"    {filter.robot}::Coefficients<double> c;",
+        f"    {filter.robot}::Coefficients<Real> c;",
         *[f"    {line}" for line in filter.constants],
-        f"    double B[{len(filter.B)}];",
-        f"    double Q[{len(filter.noise)}];",
-        f"    double R[{m}];",
+        f"    Real B[{len(filter.B)}];",
+        f"    Real Q[{len(filter.noise)}];",
+        f"    Real R[{m}];",
         *_kept(filter),
         "  };",
         "  /// Fills in what follows from the rest.",
-        "  static void prepare(Constants& k) noexcept;",
-        "  /// x after dt with what acts, input and disturbance.",
-        f"  static void ahead(const Constants& k, const double u[{p}], double dt,",
-        f"                    double x[{filter.motion}]) noexcept;",
-        "  /// x, P after a tick with input u.",
-        f"  static void predict(const Constants& k, const double u[{p}], double x[{n}],",
-        "                      double* P) noexcept;",
-        "  /// x after the samples y, of which those count whose flag is set, and what P loses: the sum of",
-        f"  /// weight Ph Ph' over the rows. Ph[{n // 2}][{m}][2]: pairs of states, rows, state of the pair.",
-        "  /// row_nis: squared innovation over its variance; 0 where not used, like the other two.",
-        f"  static void correct(const Constants& k, const double u[{p}], const double y[{m}],",
-        f"                      const bool use[{m}], double x[{n}], const double* P, double* Ph,",
-        f"                      double weight[{m}], double row_innovation[{m}],",
-        f"                      double row_nis[{m}]) noexcept;",
+        "  static void prepare(Constants<double>& k) noexcept;",
+        *steps,
         "};",
         "",
     ]
-    about = [f"Layout of the {filter.robot.upper()}'s straight-line filter in {filter.robot}_filter.cpp."]
-    includes = ['#include "equipoise/estimate/pair.hpp"', f'#include "generated/{filter.robot}_model.hpp"']
-    return _file(filter, "hpp", about, includes, body)
+    about_file = [f"Layout of the {filter.robot.upper()}'s straight-line filter in {filter.robot}_filter.cpp."]
+    return _file(filter, "hpp", about_file, [f'#include "generated/{filter.robot}_model.hpp"'], body)
 
 
 def render_code(filter: Filter) -> str:
-    n, m, p = len(filter.states), filter.outputs, filter.inputs
     name = filter.robot.capitalize() + "Filter"
-    ahead, predict, correct = (e.lines() for e in (filter.ahead, filter.predict, filter.correct))
+    lines = {step: getattr(filter, step).lines() for step in ("ahead", "predict", "correct")}
+    early = [line for code in lines.values() for line in ("  {", *code.early, "  }") if code.early]
     body = [
-        f"void {name}::prepare(Constants& k) noexcept {{",
-        *(line for code in (ahead, predict, correct) for line in ("  {", *code.early, "  }") if code.early),
-        "}",
+        f"template <class Real>",
+        f"using Constants = {name}::Constants<Real>;",
         "",
-        "EQUIPOISE_AVX512_TOO",
-        f"void {name}::ahead(const Constants& k, const double u[{p}], double dt,",
-        f"    double x[{filter.motion}]) noexcept {{",
-        *ahead.late,
-        "}",
-        "",
-        "EQUIPOISE_AVX512_TOO",
-        f"void {name}::predict(const Constants& k, const double u[{p}], double x[{n}],",
-        "    double* P) noexcept {",
-        *predict.late,
-        "}",
-        "",
-        "EQUIPOISE_AVX512_TOO",
-        f"void {name}::correct(const Constants& k, const double u[{p}], const double y[{m}],",
-        f"    const bool use[{m}], double x[{n}], const double* P, double* Ph, double weight[{m}],",
-        f"    double row_innovation[{m}], double row_nis[{m}]) noexcept {{",
-        *correct.late,
+        f"void {name}::prepare(Constants<double>& k) noexcept {{",
+        *early,
         "}",
         "",
     ]
+    for step, takes in _steps(filter).items():
+        body += ["template <class Real>"]
+        declaration = _declaration(f"{step}_of", takes, "Real", indent=0)
+        declaration[0] = f"[[gnu::always_inline]] inline {declaration[0]}"
+        body += [line for text in declaration for line in emit.statement(text, 0)]
+        body[-1] += " {"
+        body += ["  using One = OneOf<Real>;", "  using Two = TwoOf<Real>;", *lines[step].late, "}", ""]
+        names = ", ".join(["k", *(what.partition("[")[0] for _, what in takes)])
+        for real in ("double", "float"):
+            body += ["EQUIPOISE_AVX512_TOO", *_declaration(f"{name}::{step}", takes, real, indent=0)]
+            body[-1] += " {"
+            body += [f"  {step}_of({names});", "}", ""]
     about = [
         f"One step of the {filter.robot.upper()}'s default filter, straight-line: Heun's third order,",
         "F P F' as row operations on a packed triangle, scalar measurements with masks instead of branches.",
         f"The model in robots/{filter.robot}/ekf.hpp is the readable form and the reference in tests.",
     ]
-    includes = [
-        f'#include "generated/{filter.robot}_filter.hpp"',
-    ]
+    includes = [f'#include "generated/{filter.robot}_filter.hpp"', "", '#include "equipoise/estimate/lanes.hpp"']
     return _file(filter, "cpp", about, includes, body)

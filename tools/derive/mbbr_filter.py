@@ -146,10 +146,10 @@ def update() -> Emitter:
 @lru_cache(maxsize=1)
 def made() -> Filter:
     constants = [
-        "double wheels[9];     // wheel angles from the ball's, rows",
-        "double lever_arm[2];  // x, y of the IMU",
-        "double g;",
-        "double keep;  // of the disturbance, per tick",
+        "Real wheels[9];     // wheel angles from the ball's, rows",
+        "Real lever_arm[2];  // x, y of the IMU",
+        "Real g;",
+        "Real keep;  // of the disturbance, per tick",
     ]
     steps = (ahead(_derivative, 10, 3), predict(), update())
     return Filter("mbbr", STATES, 10, 3, 8, B, constants, *steps, INPUTS)

@@ -122,12 +122,12 @@ def update() -> Emitter:
 @lru_cache(maxsize=1)
 def made() -> Filter:
     constants = [
-        "double yaw_to_wheel;",
-        "double bias;  // 1 where estimated, else 0",
-        "double mount;",
-        "double lever_arm;",
-        "double g;",
-        "double keep;  // of the disturbance, per tick",
+        "Real yaw_to_wheel;",
+        "Real bias;  // 1 where estimated, else 0",
+        "Real mount;",
+        "Real lever_arm;",
+        "Real g;",
+        "Real keep;  // of the disturbance, per tick",
     ]
     steps = (ahead(_derivative, 6, 2), predict(), update())
     return Filter("mip", STATES, 6, 2, 6, B, constants, *steps, INPUTS)

@@ -1,14 +1,15 @@
 """Straight-line code: value-numbered emission.
 
 `Emitter` folds constants, drops zeros, computes equal expressions once, and moves what depends on the
-filter's constants alone to a function that runs at the start. Values are scalars or pairs, two neighbouring
-entries of a vector, which SSE2 computes at once. Matrices are sparse dicts: what is zero in them costs
-nothing.
+filter's constants alone to a function that runs at the start, in double. Values are scalars or pairs, two
+neighbouring entries of a vector, which SSE2 and NEON compute at once; late code names their types One and Two
+(estimate/lanes.hpp). Matrices are sparse dicts: what is zero in them costs nothing.
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 
 import sympy as sp
@@ -16,7 +17,8 @@ import sympy as sp
 from . import emit
 
 NAME = re.compile(r"\bt\d+\b")
-DEFINITION = re.compile(r"const (?:double|Pair) (t\d+) =")
+DEFINITION = re.compile(r"const (?:double|Pair|One|Two) (t\d+) =")
+REGISTER = re.compile(r"(?:low|high)?\(?t\d+\)?")
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,8 @@ class Emitter:
     def load(self, first: str, version: int = 0, pair: bool = True) -> Value:
         """Two neighbours in memory, or one; `version` grows with every settle() after which they are loaded
         again."""
-        return self.name(("load", first, version, pair), f"load(&{first})" if pair else first, pair=pair)
+        text = f"load(&{first})" if pair else f"One({first})"
+        return self.name(("load", first, version, pair), text, pair=pair)
 
     def settle(self) -> None:
         self.statements.append("settle();")
@@ -56,9 +59,8 @@ class Emitter:
         """The value of `text`, computed once."""
         if key not in self.known:
             name = f"t{len(self.known)}"
-            (self.early if early else self.statements).append(
-                f"const {'Pair' if pair else 'double'} {name} = {text};"
-            )
+            type_name = (("double", "Pair") if early else ("One", "Two"))[pair]
+            (self.early if early else self.statements).append(f"const {type_name} {name} = {text};")
             self.known[key] = Value(self, ("v", name), pair, early)
         return self.known[key]
 
@@ -68,31 +70,37 @@ class Emitter:
         if kind == "n":
             return f"-{self.use(Value(self, body, value.pair, value.early), early)}"
         if kind == "c":
-            return repr(body)
-        if not value.early or early or not NAME.fullmatch(body):
+            return repr(body) if early else f"One({body!r})"
+        if early:
             return body
+        if not value.early or not NAME.fullmatch(body):
+            return body if REGISTER.fullmatch(body) else f"One({body})"
         if body not in self.kept:
             self.kept[body] = f"{self.constants}{'_pairs' if value.pair else ''}[{len(self.kept)}]"
-        return self.kept[body]
+        return f"load(&{self.kept[body]})" if value.pair else f"One({self.kept[body]})"
 
     def select(self, flag: str, value: Value) -> Value:
-        return self.name(("?", flag, value.key), f"{flag} ? {self.use(value)} : 0.0")
+        return self.name(("?", flag, value.key), f"select({flag}, {self.use(value)})")
 
     def store(self, target: str, value: Value) -> None:
         text = self.use(value)
-        if text != target:
-            self.statements.append(f"store(&{target}, {text});" if value.pair else f"{target} = {text};")
+        if text != f"One({target})":
+            self.statements.append(f"store(&{target}, {text});")
 
     def lines(self) -> Lines:
-        late = _needed(self.statements)
+        late = _joined(_needed(self.statements))
         place = re.compile(re.escape(self.constants) + r"(?:_pairs)?\[\d+\]")
         used = dict.fromkeys(found for s in late for found in place.findall(s))
         new, count = {}, {}
         for old in used:
             array = old.partition("[")[0]
             new[old] = f"{array}[{count.get(array, 0)}]"
-            count[array] = count.get(array, 0) + 1
-        kept = [f"{new[old]} = {name};" for name, old in self.kept.items() if old in new]
+            count[array] = count.get(array, 0) + (2 if array.endswith("_pairs") else 1)
+        kept = [
+            f"store(&{new[old]}, {name});" if "_pairs" in old else f"{new[old]} = {name};"
+            for name, old in self.kept.items()
+            if old in new
+        ]
         late = [place.sub(lambda old: new[old[0]], s) for s in late]
         counts = (count.get(self.constants, 0), count.get(f"{self.constants}_pairs", 0))
         return Lines(_wrapped(_needed([*self.early, *kept])), _wrapped(late), *counts)
@@ -121,6 +129,30 @@ def _needed(statements: list[str]) -> list[str]:
             needed |= set(NAME.findall(s.partition("=")[2] if target else s))
             kept.append(s)
     return kept[::-1]
+
+
+PRODUCT = re.compile(r"const (?:One|Two) (t\d+) = (\S+ \* \S+);")
+SUM = re.compile(r"const (?:One|Two) t\d+ = (\S+) ([+-]) (\S+);")
+
+
+def _joined(statements: list[str]) -> list[str]:
+    """Products that one sum uses are written into it: NEON adds them as it multiplies."""
+    uses = Counter(name for s in statements for name in NAME.findall(s.partition(" = ")[2] or s))
+    products, kept = {}, []
+    for s in statements:
+        product, added = PRODUCT.fullmatch(s), SUM.fullmatch(s)
+        if product and uses[product[1]] == 1:
+            products[product[1]] = (len(kept), product[2])
+        if added:
+            for name in (added[1], added[3]):
+                if name in products:
+                    place, text = products.pop(name)
+                    kept[place] = None
+                    s = re.sub(rf"\b{name}\b", text, s)
+        elif not s.startswith("const"):
+            products.clear()  # what it reads may change
+        kept.append(s)
+    return [s for s in kept if s is not None]
 
 
 def _wrapped(statements: list[str]) -> list[str]:
@@ -156,7 +188,7 @@ class Value:
         a, b = self, other
         if a.pair is not b.pair:  # GCC would fill both lanes anew for every product
             early = a.early and b.early
-            a, b = (v if v.pair or v.number is not None else twice(v, early) for v in (a, b))
+            a, b = (v if v.pair else twice(v, early) for v in (a, b))
         early, pair = a.early and b.early, a.pair or b.pair
         if sign != "-" and (a.pair, str(a.key)) > (b.pair, str(b.key)):
             a, b = b, a
@@ -209,7 +241,7 @@ class Value:
     def inverse(self):
         if self.is_negated:
             return -((-self).inverse())
-        return self.emitter.name(("/", self.key), f"1.0 / {self.emitter.use(self, self.early)}", self.early)
+        return self.emitter.name(("/", self.key), f"inverse({self.emitter.use(self)})")
 
     def __getitem__(self, lane: int) -> Value:
         """One of a pair."""
@@ -220,7 +252,7 @@ class Value:
         if self.early:
             e = self.emitter
             return e.name(("lane", self.key, lane), f"{e.use(self, True)}[{lane}]", early=True)
-        return Value(self.emitter, ("v", f"{self.key[1]}[{lane}]"))
+        return Value(self.emitter, ("v", f"{('low', 'high')[lane]}({self.key[1]})"))
 
 
 def total(values) -> Value:
@@ -244,7 +276,7 @@ def product(values) -> Value:
     return result
 
 
-LANE = re.compile(r"(t\d+)\[(\d)\]")
+LANE = re.compile(r"(low|high)\((t\d+)\)")
 
 
 def pair(a: Value, b: Value) -> Value:
@@ -252,9 +284,8 @@ def pair(a: Value, b: Value) -> Value:
     if a.number == 0.0 and b.number == 0.0:
         return a
     e = a.emitter
-    lanes = [LANE.fullmatch(str(v.key[1])) for v in (a, b)]
-    if all(lanes) and lanes[0][1] == lanes[1][1] and lanes[0][2] == "0" and lanes[1][2] == "1":
-        return Value(e, ("v", lanes[0][1]), pair=True)
+    if is_pair(a, b):
+        return Value(e, ("v", LANE.fullmatch(a.key[1])[2]), pair=True)
     if a.is_negated and b.is_negated:
         return -pair(-a, -b)
     early = a.early and b.early and (a.number is None or b.number is None)
@@ -267,7 +298,8 @@ def twice(a: Value, early: bool) -> Value:
     if a.is_negated:
         return -twice(-a, early)
     text = a.emitter.use(a, early)
-    return a.emitter.name(("pair", a.key, a.key, early), f"{{{text}, {text}}}", early, pair=True)
+    both = f"{{{text}, {text}}}" if early else f"twice({text})"
+    return a.emitter.name(("pair", a.key, a.key, early), both, early, pair=True)
 
 
 def nonzero(row: dict) -> dict:
@@ -282,7 +314,7 @@ def dot(row: dict, vector) -> Value:
 def is_pair(a: Value, b: Value) -> bool:
     """The lanes of one."""
     lanes = [LANE.fullmatch(str(v.key[1])) for v in (a, b)]
-    return all(lanes) and (lanes[0][1], lanes[0][2], lanes[1][2]) == (lanes[1][1], "0", "1")
+    return all(lanes) and (lanes[0][1], lanes[1][1], lanes[0][2]) == ("low", "high", lanes[1][2])
 
 
 def inner(row: dict, vector) -> Value:

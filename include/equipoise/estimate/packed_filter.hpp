@@ -1,11 +1,16 @@
 // KalmanFilter of a model whose step is generated as straight-line code: the same numbers up to rounding, for
-// a fraction of the instructions. P is an upper triangle packed by rows, so that it is symmetric by form; its
-// rows start at even columns, so that pairs are aligned.
+// a fraction of the instructions, in single or double precision. P is an upper triangle packed by rows, so
+// that it is symmetric by form; its rows start at even columns, so that pairs are aligned. Angles that grow
+// are kept within a few radians, so that single precision resolves them; what is whole in them stands beside.
 // In: input, measurements with a mask of those to use -> state, variances, normalised innovation.
 // Source: tools/derive/packed.py; docs/filter.md. RT-safe: fixed size, bounded.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstring>
+#include <variant>
 
 #include "equipoise/estimate/downdate.hpp"
 #include "equipoise/estimate/kalman.hpp"
@@ -14,7 +19,8 @@
 namespace equipoise {
 
 /// Steps: generated, with Constants, prepare(), predict(), correct(). A Model supplies, beside what
-/// KalmanFilter asks for, `Steps::Constants constants()` without the noises.
+/// KalmanFilter asks for, `Steps::Constants<double> constants()` without the noises, `kTurning`, the first of
+/// `kTurnings` angles that its motion does not depend on, and `turning_rows()`, how the samples do.
 template <class Model, class Steps>
 class PackedFilter {
  public:
@@ -26,24 +32,36 @@ class PackedFilter {
   static_assert(Steps::kTickS == kTickS);
   using Params = typename KalmanFilter<Model>::Params;
 
-  PackedFilter(const Model& model, const Params& params)
-      : constants_(model.constants()), initial_variance_(params.initial_variance) {
+  PackedFilter(const Model& model, const Params& params, Precision precision = Precision::kDouble)
+      : initial_variance_(params.initial_variance), turning_rows_(model.turning_rows()) {
+    Constants<double> k = model.constants();
     const Mat<n, p> B = model.input_matrix();
     Mat<n, n> Q = B * params.input_variance.asDiagonal() * B.transpose();
     Q.diagonal() += params.Q;
     int place = 0;
-    for (const auto& [state, input] : Steps::kB) constants_.B[place++] = B(state, input);
+    for (const auto& [state, input] : Steps::kB) k.B[place++] = B(state, input);
     place = 0;
-    for (const auto& [row, column] : Steps::kQ) constants_.Q[place++] = Q(row, column);
-    Eigen::Map<Vec<m>>(constants_.R) = params.R;
-    Steps::prepare(constants_);
+    for (const auto& [row, column] : Steps::kQ) k.Q[place++] = Q(row, column);
+    Eigen::Map<Vec<m>>(k.R) = params.R;
+    Steps::prepare(k);
+    if (precision == Precision::kSingle) {
+      core_ = Core<float>{rounded(k), {}, {}};
+    } else {
+      core_ = Core<double>{k, {}, {}};
+    }
     reset(Vec<n>::Zero());
   }
 
   void reset(const Vec<n>& x) noexcept {
-    x_ = x;
-    P_.fill(0.0);
-    for (int i = 0; i < n; ++i) P_[place(i, i)] = initial_variance_(i);
+    whole_.setZero();
+    expected_whole_.setZero();
+    std::visit(
+        [&](auto& core) {
+          core.P.fill(0);
+          for (int i = 0; i < n; ++i) core.P[place(i, i)] = static_cast<RealOf<decltype(core)>>(initial_variance_(i));
+          take(x, core);
+        },
+        core_);
     normalized_innovation_ = 0.0;
     row_nis_.fill(0.0);
     row_innovation_.fill(0.0);
@@ -51,19 +69,32 @@ class PackedFilter {
 
   /// The motion's states `x` after dt, with what acts, input and disturbance.
   void ahead(const Vec<p>& u, double dt, Vec<kMotion>& x) const noexcept {
-    Steps::ahead(constants_, u.data(), dt, x.data());
+    const Turnings from = x.template segment<Model::kTurnings>(Model::kTurning);
+    x.template segment<Model::kTurnings>(Model::kTurning).setZero();
+    std::visit(
+        [&](const auto& core) {
+          using Real = RealOf<decltype(core)>;
+          const Vector<Real, p> acts(u);
+          Vector<Real, kMotion> moved(x);
+          Steps::ahead(core.k, acts.data(), static_cast<Real>(dt), moved.data());
+          moved.copy_to(x);
+        },
+        core_);
+    x.template segment<Model::kTurnings>(Model::kTurning) += from;
   }
 
   void predict(const Vec<p>& u) noexcept {
-    Steps::predict(constants_, u.data(), x_.data(), P_.data() + Steps::kMiddleP);
+    std::visit(
+        [&](auto& core) {
+          const Vector<RealOf<decltype(core)>, p> acts(u);
+          Steps::predict(core.k, acts.data(), core.x.data(), core.P.data() + Steps::kMiddleP);
+          show(core);
+        },
+        core_);
   }
 
   void update(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
-    alignas(16) double Ph[n * m];
-    double weight[m];
-    Steps::correct(constants_, u.data(), y.data(), use.data(), x_.data(), P_.data() + Steps::kMiddleP,
-                   Ph + Steps::kMiddlePh, weight, row_innovation_.data(), row_nis_.data());
-    downdate<n, m>(weight, Ph, P_.data());
+    std::visit([&](auto& core) { update(core, u, y, use); }, core_);
     double nis = 0.0;
     int used = 0;
     for (std::size_t i = 0; i < m; ++i) {
@@ -75,17 +106,20 @@ class PackedFilter {
 
   /// Adds to the variances of `count` states from `first` on.
   void widen(int first, int count, double variance) noexcept {
-    for (int i = first; i < first + count; ++i) P_[place(i, i)] += variance;
+    std::visit(
+        [&](auto& core) {
+          for (int i = first; i < first + count; ++i)
+            core.P[place(i, i)] += static_cast<RealOf<decltype(core)>>(variance);
+        },
+        core_);
   }
 
   const Vec<n>& x() const noexcept { return x_; }
-  double variance(int state) const noexcept { return P_[place(state, state)]; }
+  double variance(int state) const noexcept { return P_at(state, state); }
   Mat<n, n> P() const noexcept {
-    Mat<n, n> P;
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) P(i, j) = P_[place(i, j)];
-    }
-    return P;
+    return Mat<n, n>::NullaryExpr([this](Eigen::Index i, Eigen::Index j) {
+      return P_at(static_cast<int>(i), static_cast<int>(j));
+    });
   }
   double normalized_innovation() const noexcept { return normalized_innovation_; }
   /// Squared innovation over its variance, of each row; 0 where it was not used.
@@ -94,16 +128,115 @@ class PackedFilter {
   const std::array<double, m>& row_innovation() const noexcept { return row_innovation_; }
 
  private:
+  template <class Real>
+  using Constants = typename Steps::template Constants<Real>;
+  using Turnings = Vec<Model::kTurnings>;
+
+  template <class Real>
+  struct Core {
+    using Number = Real;
+    Constants<Real> k;
+    alignas(16) std::array<Real, n> x;
+    alignas(16) std::array<Real, static_cast<std::size_t>(Steps::kTriangle)> P;
+  };
+  template <class C>
+  using RealOf = typename std::decay_t<C>::Number;
+
+  /// A vector of the core's numbers.
+  template <class Real, int size>
+  struct Vector {
+    std::array<Real, size> v;
+    explicit Vector(const Vec<size>& from) noexcept {
+      for (int i = 0; i < size; ++i) v[static_cast<std::size_t>(i)] = static_cast<Real>(from(i));
+    }
+    const Real* data() const noexcept { return v.data(); }
+    Real* data() noexcept { return v.data(); }
+    void copy_to(Vec<size>& to) const noexcept {
+      for (int i = 0; i < size; ++i) to(i) = static_cast<double>(v[static_cast<std::size_t>(i)]);
+    }
+  };
+
+  static Constants<float> rounded(const Constants<double>& k) noexcept {
+    constexpr std::size_t kNumbers = sizeof k / sizeof(double);
+    static_assert(sizeof(Constants<float>) == kNumbers * sizeof(float));
+    std::array<double, kNumbers> from;
+    std::array<float, kNumbers> to;
+    std::memcpy(from.data(), &k, sizeof k);
+    std::transform(from.begin(), from.end(), to.begin(), [](double v) { return static_cast<float>(v); });
+    Constants<float> result;
+    std::memcpy(&result, to.data(), sizeof result);
+    return result;
+  }
+
   static constexpr std::size_t place(int row, int column) noexcept {
     const int i = row < column ? row : column;
     const int j = row < column ? column : row;
     return static_cast<std::size_t>(i * n - 2 * (i / 2) * ((i - 1) / 2) + j - i / 2 * 2);
   }
+  double P_at(int row, int column) const noexcept {
+    return std::visit([&](const auto& core) { return static_cast<double>(core.P[place(row, column)]); }, core_);
+  }
 
-  typename Steps::Constants constants_;
+  template <class Real>
+  void update(Core<Real>& core, const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
+    alignas(16) Real Ph[n * m];
+    Real weight[m];
+    Real innovation[m];
+    Real nis[m];
+    const Vector<Real, p> acts(u);
+    const Vector<Real, m> seen(y - expected_whole_);
+    Steps::correct(core.k, acts.data(), seen.data(), use.data(), core.x.data(), core.P.data() + Steps::kMiddleP,
+                   Ph + Steps::kMiddlePh, weight, innovation, nis);
+    downdate<n, m>(weight, Ph, core.P.data());
+    for (std::size_t i = 0; i < m; ++i) {
+      row_innovation_[i] = static_cast<double>(innovation[i]);
+      row_nis_[i] = static_cast<double>(nis[i]);
+    }
+    keep_small(core);
+    show(core);
+  }
+
+  template <class Real>
+  void take(const Vec<n>& x, Core<Real>& core) noexcept {
+    Vec<n> rest = x;
+    for (int i = 0; i < Model::kTurnings; ++i) {
+      whole_(i) = std::trunc(x(Model::kTurning + i));
+      rest(Model::kTurning + i) -= whole_(i);
+    }
+    expected_whole_ = turning_rows_ * whole_;
+    const Vector<Real, n> numbers(rest);
+    core.x = numbers.v;
+    show(core);
+  }
+
+  /// Whole radians leave the angles; exact in either precision.
+  template <class Real>
+  void keep_small(Core<Real>& core) noexcept {
+    constexpr Real kLargest = 4;
+    bool moved = false;
+    for (int i = 0; i < Model::kTurnings; ++i) {
+      Real& angle = core.x[static_cast<std::size_t>(Model::kTurning + i)];
+      if (!(std::abs(angle) > kLargest) || !(std::abs(angle) < Real{1e9})) continue;
+      const auto whole = static_cast<std::int32_t>(angle);
+      angle -= static_cast<Real>(whole);
+      whole_(i) += whole;
+      moved = true;
+    }
+    if (moved) expected_whole_ = turning_rows_ * whole_;
+  }
+
+  template <class Real>
+  void show(const Core<Real>& core) noexcept {
+    for (int i = 0; i < n; ++i) x_(i) = static_cast<double>(core.x[static_cast<std::size_t>(i)]);
+    x_.template segment<Model::kTurnings>(Model::kTurning) += whole_;
+  }
+
+  std::variant<Core<double>, Core<float>> core_;
   Vec<n> initial_variance_;
-  alignas(16) Vec<n> x_;
-  alignas(16) std::array<double, static_cast<std::size_t>(Steps::kTriangle)> P_{};
+  Vec<n> x_;
+  Mat<m, Model::kTurnings> turning_rows_;
+  Turnings whole_;         // what x has beside the core's
+  Vec<m> expected_whole_;  // of the samples
   double normalized_innovation_ = 0.0;
   std::array<double, m> row_nis_{};
   std::array<double, m> row_innovation_{};

@@ -102,6 +102,7 @@ MbbrEkf::Params read_ekf(Section s) {
   p.filter.input_variance = s.vector<3>("input_variance", 0.0, 100.0);
   p.filter.initial_variance = s.vector<n>("initial_sigma", 0.0, 30.0).cwiseAbs2();
   p.disturbance_time_constant_s = s.number("disturbance_time_constant_s", kTickS, 1e6);
+  p.precision = config::read_precision(s);
   p.push_nis = s.number("push_nis", 1.0, 1e9);
   p.push_tilt_rate_variance = s.number("push_tilt_rate_variance", 0.0, 100.0);
   p.push_ball_rate_variance = s.number("push_ball_rate_variance", 0.0, 1000.0);

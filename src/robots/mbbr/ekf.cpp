@@ -108,8 +108,14 @@ void MbbrEkfModel::measure(const Vec<18>& x, const Vec3& u, Vec<8>& y, Mat<8, 18
   H.block<3, 2>(kWheel, kThetaX) = -scale * wheels_from_ball_.leftCols<2>();
 }
 
-generated::MbbrFilter::Constants MbbrEkfModel::constants() const noexcept {
-  generated::MbbrFilter::Constants k{};
+Mat<8, 3> MbbrEkfModel::turning_rows() const noexcept {
+  Mat<8, 3> rows = Mat<8, 3>::Zero();
+  rows.middleRows<3>(kWheel) = wheels_from_ball_;
+  return rows;
+}
+
+generated::MbbrFilter::Constants<double> MbbrEkfModel::constants() const noexcept {
+  generated::MbbrFilter::Constants<double> k{};
   k.c = c_;
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(k.wheels) = wheels_from_ball_;
   Eigen::Map<Vec2>(k.lever_arm) = lever_arm_;
@@ -121,7 +127,7 @@ generated::MbbrFilter::Constants MbbrEkfModel::constants() const noexcept {
 MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
     : params_(params),
       kinematics_(robot),
-      filter_(Model(robot, params.disturbance_time_constant_s), params.filter),
+      filter_(Model(robot, params.disturbance_time_constant_s), params.filter, params.precision),
       time_(params.sensor_age_s) {
   start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
 }

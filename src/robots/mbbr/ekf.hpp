@@ -39,13 +39,17 @@ class MbbrEkfModel {
     kDisturbance
   };
   enum Output : int { kGyro, kWheel = 3, kAccel = 6 };  // three, three, two rows
+  static constexpr int kTurning = kE;                   // angles that grow without bound
+  static constexpr int kTurnings = 3;
 
   MbbrEkfModel(const MbbrParameters& p, double disturbance_time_constant_s);
   void predict(const Vec<18>& x, const Vec3& u, Vec<18>& x_next, Mat<18, 18>& F) const noexcept;
   Mat<18, 3> input_matrix() const noexcept;
   void measure(const Vec<18>& x, const Vec3& u, Vec<8>& y, Mat<8, 18>& H) const noexcept;
   /// For the generated form of the filter, noises left open.
-  generated::MbbrFilter::Constants constants() const noexcept;
+  generated::MbbrFilter::Constants<double> constants() const noexcept;
+  /// What the samples have of the turning angles.
+  Mat<8, 3> turning_rows() const noexcept;
   /// The observable states after dt, without a Jacobian.
   MbbrObservable::State ahead(const MbbrObservable::State& x, const Vec3& u, double dt) const noexcept;
 
@@ -67,6 +71,7 @@ class MbbrEkf {
     Filter::Params filter;
     double disturbance_time_constant_s = 1.0;
     double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
+    Precision precision = Precision::kDouble;
     double push_nis = 6.0;      // more than this in a tick is a push: the rates are in doubt by
     double push_tilt_rate_variance = 0.02;
     double push_ball_rate_variance = 0.5;

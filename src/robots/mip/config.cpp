@@ -47,6 +47,7 @@ MipEkf::Params read_ekf(Section s) {
   p.filter.input_variance = s.vector<2>("input_variance", 0.0, 100.0);
   p.filter.initial_variance = s.vector<n>("initial_sigma", 0.0, 30.0).cwiseAbs2();
   p.disturbance_time_constant_s = s.number("disturbance_time_constant_s", kTickS, 1e6);
+  p.precision = config::read_precision(s);
   s.finish();
   return p;
 }

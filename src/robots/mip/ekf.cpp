@@ -151,8 +151,14 @@ void MipEkfModel::measure(const Vec<14>& x, const Vec2& u, Vec<6>& y, Mat<6, 14>
   H(kAccelY, kDisturbance) = c_.accel_y_ux;
 }
 
-generated::MipFilter::Constants MipEkfModel::constants() const noexcept {
-  generated::MipFilter::Constants k{};
+Mat<6, 2> MipEkfModel::turning_rows() const noexcept {
+  Mat<6, 2> rows = Mat<6, 2>::Zero();
+  rows.middleRows<2>(kWheel) << 1.0, yaw_to_wheel_, 1.0, -yaw_to_wheel_;
+  return rows;
+}
+
+generated::MipFilter::Constants<double> MipEkfModel::constants() const noexcept {
+  generated::MipFilter::Constants<double> k{};
   k.c = c_;
   k.yaw_to_wheel = yaw_to_wheel_;
   k.bias = bias_;
@@ -165,7 +171,8 @@ generated::MipFilter::Constants MipEkfModel::constants() const noexcept {
 
 MipEkf::MipEkf(const MipParameters& robot, const Params& params)
     : kinematics_(robot),
-      filter_(Model(robot, params.options, params.disturbance_time_constant_s), params.filter),
+      filter_(Model(robot, params.options, params.disturbance_time_constant_s), params.filter,
+              params.precision),
       time_(params.sensor_age_s) {
   start(0.0, Vec3::Zero(), Vec2::Zero());
 }

@@ -44,7 +44,9 @@ class MipEkfModel {
     kDisturbance
   };
   enum Output : int { kGyro, kWheel = 3, kAccelY = 5 };  // three, two, one row
-  using Motion = Vec<6>;                                 // the first six states
+  static constexpr int kTurning = kPhi;                  // angles that grow without bound
+  static constexpr int kTurnings = 2;
+  using Motion = Vec<6>;  // the first six states
 
   MipEkfModel(const MipParameters& p, const MipEkfOptions& options, double disturbance_time_constant_s);
   void derivative(const Motion& x, const Vec2& u, Motion& x_dot, Mat<6, 6>& A) const noexcept;
@@ -52,7 +54,9 @@ class MipEkfModel {
   Mat<14, 2> input_matrix() const noexcept;
   void measure(const Vec<14>& x, const Vec2& u, Vec<6>& y, Mat<6, 14>& H) const noexcept;
   /// For the generated form of the filter, noises left open.
-  generated::MipFilter::Constants constants() const noexcept;
+  generated::MipFilter::Constants<double> constants() const noexcept;
+  /// What the samples have of the turning angles.
+  Mat<6, 2> turning_rows() const noexcept;
   /// The motion after dt, without a Jacobian.
   Motion ahead(const Motion& x, const Vec2& u, double dt) const noexcept;
 
@@ -77,6 +81,7 @@ class MipEkf {
     MipEkfOptions options;
     double disturbance_time_constant_s = 1.0;
     double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
+    Precision precision = Precision::kDouble;
   };
 
   MipEkf(const MipParameters& robot, const Params& params);

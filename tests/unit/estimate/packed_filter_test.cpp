@@ -1,4 +1,5 @@
-// The generated filters against the readable dense form, with masks, samples that lie and widened variances.
+// The generated filters against the readable dense form, with masks, faulty samples and widened variances;
+// single precision against double.
 // EQUIPOISE_FILTER_STEPS=1000000 makes the comparison longer.
 #include "equipoise/estimate/packed_filter.hpp"
 
@@ -153,6 +154,49 @@ TYPED_TEST(PackedFilterTest, AgreesWithTheDenseFormThroughMasksAndJumps) {
   }
   std::printf("%ld steps: states %.1e, covariance %.1e, innovations %.1e\n", end, worst_x, worst_P,
               worst_nis);
+}
+
+/// Turning and driving for minutes: thousands of radians on the encoders, which a float resolves to 1e-3.
+TYPED_TEST(PackedFilterTest, InSinglePrecisionStaysWithinAFractionOfSigma) {
+  using Model = typename TestFixture::Model;
+  constexpr int m = TestFixture::m;
+  constexpr double kDriven = 9000.0;
+  typename TestFixture::Packed single(this->model_, this->robot_.params, Precision::kSingle);
+  auto& reference = this->packed_;
+  const auto far = [](double t) {
+    auto x = TypeParam::truth(t);
+    for (int i = 0; i < Model::kTurnings; ++i) x(Model::kTurning + i) += kDriven;
+    return x;
+  };
+  single.reset(far(0.0));
+  reference.reset(far(0.0));
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> noise;
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const Vec<m> sigma = this->robot_.params.R.cwiseSqrt();
+  double worst = 0.0;
+  const long end = steps();
+  for (long k = 1; k <= end; ++k) {
+    const Vec<TestFixture::p> u = Vec<TestFixture::p>::NullaryExpr([&] { return 0.2 * noise(random); });
+    Vec<m> y;
+    Mat<m, TestFixture::n> H;
+    this->model_.measure(far(static_cast<double>(k) * kTickS), u, y, H);
+    for (int i = 0; i < m; ++i) y(i) += sigma(i) * noise(random);
+    std::array<bool, m> use{};
+    for (bool& row : use) row = unit(random) > 0.02;
+    for (auto* filter : {&single, &reference}) {
+      filter->predict(u);
+      filter->update(u, y, use);
+    }
+    for (int i = 0; i < TestFixture::n; ++i) {
+      const double one_sigma = std::sqrt(reference.variance(i));
+      worst = std::max(worst, std::abs(single.x()(i) - reference.x()(i)) / one_sigma);
+      ASSERT_NEAR(std::sqrt(single.variance(i)), one_sigma, 0.01 * one_sigma) << k << " state " << i;
+    }
+    ASSERT_LT(worst, 0.1) << k;
+  }
+  EXPECT_NE(single.x(), reference.x());  // it is single
+  std::printf("%ld steps: %.1e sigma\n", end, worst);
 }
 
 TYPED_TEST(PackedFilterTest, HoldsEveryEntryOfTheProcessNoise) {

@@ -211,7 +211,7 @@ ROOMS: dict[str, Room] = {
                 "tests/unit_tests",
                 ("unit/estimate/packed_filter_test.cpp",),
                 sources=FILTERS,
-                only=("*/packed_filter.hpp", "*/downdate.hpp", "*/pair.hpp"),
+                only=("*/packed_filter.hpp", "*/downdate.hpp", "*/lanes.hpp"),
             ),
             Stage(
                 "tests/unit_tests", ("unit/estimate/*_test.cpp",), sources=FILTERS, never=("*/freshness.hpp",)
