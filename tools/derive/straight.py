@@ -131,28 +131,31 @@ def _needed(statements: list[str]) -> list[str]:
     return kept[::-1]
 
 
-PRODUCT = re.compile(r"const (?:One|Two) (t\d+) = (\S+ \* \S+);")
-SUM = re.compile(r"const (?:One|Two) t\d+ = (\S+) ([+-]) (\S+);")
+PRODUCT = re.compile(r"const (?:One|Two) (t\d+) = (\S+) \* (\S+);")
+SUM = re.compile(r"(const (?:One|Two) t\d+ =) (\S+) ([+-]) (\S+);")
 
 
 def _joined(statements: list[str]) -> list[str]:
-    """Products that one sum uses are written into it: NEON adds them as it multiplies."""
+    """A product that one sum uses is written into it: NEON adds it as it multiplies."""
     uses = Counter(name for s in statements for name in NAME.findall(s.partition(" = ")[2] or s))
-    products, kept = {}, []
+    products: dict[str, tuple[int, str]] = {}
+    kept: list[str] = []
     for s in statements:
         product, added = PRODUCT.fullmatch(s), SUM.fullmatch(s)
         if product and uses[product[1]] == 1:
-            products[product[1]] = (len(kept), product[2])
+            products[product[1]] = (len(kept), f"{product[2]}, {product[3]}")
         if added:
-            for name in (added[1], added[3]):
-                if name in products:
-                    place, text = products.pop(name)
-                    kept[place] = None
-                    s = re.sub(rf"\b{name}\b", text, s)
+            target, first, sign, second = added.groups()
+            if sign == "+" and second not in products:
+                first, second = second, first
+            if second in products:
+                place, factors = products.pop(second)
+                kept[place] = ""
+                s = f"{target} {'plus' if sign == '+' else 'minus'}({first}, {factors});"
         elif not s.startswith("const"):
-            products.clear()  # what it reads may change
+            products.clear()  # what they read may change
         kept.append(s)
-    return [s for s in kept if s is not None]
+    return [s for s in kept if s]
 
 
 def _wrapped(statements: list[str]) -> list[str]:

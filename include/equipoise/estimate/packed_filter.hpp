@@ -58,7 +58,8 @@ class PackedFilter {
     std::visit(
         [&](auto& core) {
           core.P.fill(0);
-          for (int i = 0; i < n; ++i) core.P[place(i, i)] = static_cast<RealOf<decltype(core)>>(initial_variance_(i));
+          for (int i = 0; i < n; ++i)
+            core.P[place(i, i)] = static_cast<RealOf<decltype(core)>>(initial_variance_(i));
           take(x, core);
         },
         core_);
@@ -117,9 +118,8 @@ class PackedFilter {
   const Vec<n>& x() const noexcept { return x_; }
   double variance(int state) const noexcept { return P_at(state, state); }
   Mat<n, n> P() const noexcept {
-    return Mat<n, n>::NullaryExpr([this](Eigen::Index i, Eigen::Index j) {
-      return P_at(static_cast<int>(i), static_cast<int>(j));
-    });
+    return Mat<n, n>::NullaryExpr(
+        [this](Eigen::Index i, Eigen::Index j) { return P_at(static_cast<int>(i), static_cast<int>(j)); });
   }
   double normalized_innovation() const noexcept { return normalized_innovation_; }
   /// Squared innovation over its variance, of each row; 0 where it was not used.
@@ -174,7 +174,8 @@ class PackedFilter {
     return static_cast<std::size_t>(i * n - 2 * (i / 2) * ((i - 1) / 2) + j - i / 2 * 2);
   }
   double P_at(int row, int column) const noexcept {
-    return std::visit([&](const auto& core) { return static_cast<double>(core.P[place(row, column)]); }, core_);
+    return std::visit([&](const auto& core) { return static_cast<double>(core.P[place(row, column)]); },
+                      core_);
   }
 
   template <class Real>
@@ -185,8 +186,8 @@ class PackedFilter {
     Real nis[m];
     const Vector<Real, p> acts(u);
     const Vector<Real, m> seen(y - expected_whole_);
-    Steps::correct(core.k, acts.data(), seen.data(), use.data(), core.x.data(), core.P.data() + Steps::kMiddleP,
-                   Ph + Steps::kMiddlePh, weight, innovation, nis);
+    Steps::correct(core.k, acts.data(), seen.data(), use.data(), core.x.data(),
+                   core.P.data() + Steps::kMiddleP, Ph + Steps::kMiddlePh, weight, innovation, nis);
     downdate<n, m>(weight, Ph, core.P.data());
     for (std::size_t i = 0; i < m; ++i) {
       row_innovation_[i] = static_cast<double>(innovation[i]);

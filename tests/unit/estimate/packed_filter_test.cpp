@@ -158,14 +158,15 @@ TYPED_TEST(PackedFilterTest, AgreesWithTheDenseFormThroughMasksAndJumps) {
 
 /// Turning and driving for minutes: thousands of radians on the encoders, which a float resolves to 1e-3.
 TYPED_TEST(PackedFilterTest, InSinglePrecisionStaysWithinAFractionOfSigma) {
-  using Model = typename TestFixture::Model;
-  constexpr int m = TestFixture::m;
+  constexpr int kTurning = TypeParam::Model::kTurning;
+  constexpr int kTurnings = TypeParam::Model::kTurnings;
+  constexpr int kOutputs = TestFixture::m;
   constexpr double kDriven = 9000.0;
   typename TestFixture::Packed single(this->model_, this->robot_.params, Precision::kSingle);
   auto& reference = this->packed_;
   const auto far = [](double t) {
     auto x = TypeParam::truth(t);
-    for (int i = 0; i < Model::kTurnings; ++i) x(Model::kTurning + i) += kDriven;
+    for (int i = kTurning; i < kTurning + kTurnings; ++i) x(i) += kDriven;
     return x;
   };
   single.reset(far(0.0));
@@ -173,16 +174,16 @@ TYPED_TEST(PackedFilterTest, InSinglePrecisionStaysWithinAFractionOfSigma) {
   std::mt19937_64 random(7);
   std::normal_distribution<double> noise;
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  const Vec<m> sigma = this->robot_.params.R.cwiseSqrt();
+  const Vec<kOutputs> sigma = this->robot_.params.R.cwiseSqrt();
   double worst = 0.0;
   const long end = steps();
   for (long k = 1; k <= end; ++k) {
     const Vec<TestFixture::p> u = Vec<TestFixture::p>::NullaryExpr([&] { return 0.2 * noise(random); });
-    Vec<m> y;
-    Mat<m, TestFixture::n> H;
+    Vec<kOutputs> y;
+    Mat<kOutputs, TestFixture::n> H;
     this->model_.measure(far(static_cast<double>(k) * kTickS), u, y, H);
-    for (int i = 0; i < m; ++i) y(i) += sigma(i) * noise(random);
-    std::array<bool, m> use{};
+    for (int i = 0; i < kOutputs; ++i) y(i) += sigma(i) * noise(random);
+    std::array<bool, kOutputs> use{};
     for (bool& row : use) row = unit(random) > 0.02;
     for (auto* filter : {&single, &reference}) {
       filter->predict(u);
