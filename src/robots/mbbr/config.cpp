@@ -177,6 +177,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   read_filter<KalmanFilter<MbbrPublishedModel>>(estimator.table("ekf13_published"),
                                                 c.estimators.ekf13_published);
   Section kf = estimator.table("kf_attitude");
+  c.estimators.kf_published = kf.choice("model", {"derived", "published"}) == 1;
   c.estimators.kf_yaw_transport = kf.boolean("yaw_transport");
   read_filter<KalmanFilter<MbbrLinearModel>>(kf, c.estimators.kf);
   estimator.finish();

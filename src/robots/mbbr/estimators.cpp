@@ -62,7 +62,9 @@ MbbrEstimators::MbbrEstimators(const Params& params)
       dead_encoders_(yaw_from_wheels(kinematics_)),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
-      kf_(MbbrLinearModel(params.robot, params.kf_yaw_transport), params.kf) {}
+      kf_(params.kf_published ? MbbrLinearModel::published()
+                              : MbbrLinearModel(params.robot, params.kf_yaw_transport),
+          params.kf) {}
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);

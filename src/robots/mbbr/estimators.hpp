@@ -35,6 +35,7 @@ struct MbbrEstimatorParams {
   KalmanFilter<MbbrModel13>::Params ekf13;
   KalmanFilter<MbbrLinearModel>::Params kf;
   bool kf_yaw_transport = true;  // false: as in [T]
+  bool kf_published = false;     // (5.28), (5.29) as published
   MbbrParameters robot;
 };
 

@@ -246,7 +246,38 @@ MbbrLinearModel::MbbrLinearModel(const MbbrParameters& p, bool yaw_transport) no
     D_(4, k) = (y - y0)(3);
     D_(5, k) = (y - y0)(4);
   }
-  F_ = Mat<8, 8>::Identity() + kTickS * A;
+  discretise(A);
+}
+
+MbbrLinearModel MbbrLinearModel::published() noexcept {
+  MbbrLinearModel m;
+  Mat<8, 8> A = Mat<8, 8>::Zero();
+  A.topRightCorner<4, 4>().setIdentity();
+  m.B_.setZero();
+  m.H_.setZero();
+  m.D_.setZero();
+  for (int axis = 0; axis < 2; ++axis) {
+    const int theta = axis, theta_dot = 4 + axis, phi_dot = 6 + axis;
+    A(theta_dot, theta) = 130.0;
+    A(theta_dot, theta_dot) = -8.9;
+    A(theta_dot, phi_dot) = 8.9;
+    m.B_(theta_dot, axis) = kTickS * -130.0;
+    A(phi_dot, theta) = -280.0;
+    A(phi_dot, theta_dot) = 34.0;
+    A(phi_dot, phi_dot) = -34.0;
+    m.B_(phi_dot, axis) = kTickS * 410.0;
+    m.H_(axis, theta_dot) = 1.0;
+    m.H_(2 + axis, 2 + axis) = 1.0;
+    m.H_(2 + axis, theta) = -1.0;
+    const int row = 5 - axis;  // the accelerometer's y sees the rotation about x
+    const double sign = axis == 0 ? 1.0 : -1.0;
+    m.H_(row, theta) = sign * 4.6;
+    m.H_(row, theta_dot) = sign * -0.5;
+    m.H_(row, phi_dot) = sign * 0.5;
+    m.D_(row, axis) = sign * -7.8;
+  }
+  m.discretise(A);
+  return m;
 }
 
 void MbbrLinearModel::predict(const Vec<8>& x, const Vec3& u, Vec<8>& x_next, Mat<8, 8>& F) const noexcept {

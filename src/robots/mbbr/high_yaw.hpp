@@ -80,6 +80,8 @@ class MbbrLinearModel {
   static constexpr int kOutputs = 6;  // gyro x, y, encoder x, y, accelerometer x, y
 
   MbbrLinearModel(const MbbrParameters& p, bool yaw_transport) noexcept;
+  /// (5.28), (5.29) in their published digits, for comparison only.
+  static MbbrLinearModel published() noexcept;
   void predict(const Vec<8>& x, const Vec3& u, Vec<8>& x_next, Mat<8, 8>& F) const noexcept;
   Mat<8, 3> input_matrix() const noexcept { return B_; }
   void measure(const Vec<8>& x, const Vec3& u, Vec<6>& y, Mat<6, 8>& H) const noexcept;
@@ -89,7 +91,10 @@ class MbbrLinearModel {
   Mat<8, 3> B_;  // third column zero
   Mat<6, 8> H_;
   Mat<6, 3> D_;
-  bool yaw_transport_;
+  bool yaw_transport_ = false;
+
+  MbbrLinearModel() = default;
+  void discretise(const Mat<8, 8>& A) noexcept { F_ = Mat<8, 8>::Identity() + kTickS * A; }  // (6.1)
 };
 
 }  // namespace equipoise
