@@ -19,8 +19,8 @@ from equipoise_tools.experiments import (
     data,
     estimation_accuracy,
     framework,
-    printed_gains,
-    printed_kf,
+    published_gains,
+    published_kf,
     runs,
     table_3_3,
     vibration,
@@ -30,12 +30,12 @@ from equipoise_tools.experiments.framework import (
     CORRECTED,
     FITTED,
     NOT_SHOWN,
-    PRINTED,
+    PUBLISHED,
     REFUTED,
     Result,
 )
 
-OF_T = Ran("ekf13_published", "thesis as printed", "full", "[T] Table 6.3")
+OF_T = Ran("ekf13_published", "thesis as published", "full", "[T] Table 6.3")
 OURS = Ran("ekf", "thesis corrected", "full", "[T] Table 6.3")
 
 
@@ -52,7 +52,7 @@ def result() -> Result:
     made = Result(
         "A title", "do it", "How.", "because.", runs_of(printed=(1, 2, 3, 10), ours=(0.1, 0.2, 0.3, 0.4))
     )
-    made.add("Table 6.1", "error", "printed", "error", printed=5.0, unit="rad")
+    made.add("Table 6.1", "error", "printed", "error", published=5.0, unit="rad")
     made.check("Table 6.1", "is small", "printed", "error", at_most=0.5)
     made.check("Table 6.1", "is small", "ours", "error", at_most=0.5)
     return made
@@ -74,7 +74,7 @@ def test_values_are_medians_with_intervals_beside_print():
 def test_page_says_what_ran_what_is_needed_and_why(tmp_path):
     framework.write("some", result(), tmp_path)
     page = (tmp_path / "some.md").read_text()
-    assert "| Table 6.1 | is small | [T] | ekf13_published, thesis as printed, [T] Table 6.3, full | 2.5 | at most 0.5 | **no** |" in page  # fmt: skip # noqa: E501
+    assert "| Table 6.1 | is small | [T] | ekf13_published, thesis as published, [T] Table 6.3, full | 2.5 | at most 0.5 | **no** |" in page  # fmt: skip # noqa: E501
     assert "1.15 to 8.95" in page
     assert "Why they differ: because." in page
 
@@ -92,7 +92,10 @@ def test_an_honest_record_has_no_complaints():
         ({"limit": [5.0]}, "at most 5 is True"),  # wrong limit
         ({"measured": 0.4}, "2.5 in the data, not 0.4"),
         ({"holds": True}, "is False"),
-        ({"ran": {**OF_T.__dict__, "control": "thesis corrected"}}, "ran ekf13_published, thesis as printed"),
+        (
+            {"ran": {**OF_T.__dict__, "control": "thesis corrected"}},
+            "ran ekf13_published, thesis as published",
+        ),
         ({"ran": {**OURS.__dict__}}, "no error of ekf in case printed"),  # wrong subject
         ({"case": "ours"}, "no error of ekf13_published in case ours"),
     ],
@@ -107,9 +110,9 @@ def test_a_finding_that_claims_more_than_its_data_is_found(planted, complaint):
 
 def test_a_status_that_claims_more_than_its_findings_is_found():
     record, found = record_and_data()
-    record["statuses"]["Table 6.1"] = PRINTED
+    record["statuses"]["Table 6.1"] = PUBLISHED
     assert framework.complaints(record, found) == [
-        "Table 6.1: the findings support 'with our correction', not 'as printed'"
+        "Table 6.1: the findings support 'with our correction', not 'as published'"
     ]
 
 
@@ -122,7 +125,7 @@ def status_of(*checks) -> str:
 
 def test_statuses():
     assert status_of() == NOT_SHOWN
-    assert status_of(("printed", {"at_most": 1.5})) == PRINTED
+    assert status_of(("printed", {"at_most": 1.5})) == PUBLISHED
     assert status_of(("printed", {"at_most": 0.5})) == NOT_SHOWN
     assert status_of(("printed", {"at_most": 0.5, "derived": True})) == REFUTED
     assert status_of(("ours", {"at_least": 1.5})) == CORRECTED
@@ -143,10 +146,10 @@ def test_a_number_that_no_run_has_bears_nothing_out():
 
 
 def test_what_ran_is_taken_from_the_run_not_from_the_page():
-    case = runs.Case("c", sets={**runs.AS_PRINTED})
-    assert runs.control_of(case, {"controller": "thesis"}) == "thesis as printed"
-    for key in runs.AS_PRINTED:  # one thing corrected is enough
-        less = {k: v for k, v in runs.AS_PRINTED.items() if k != key}
+    case = runs.Case("c", sets={**runs.AS_PUBLISHED})
+    assert runs.control_of(case, {"controller": "thesis"}) == "thesis as published"
+    for key in runs.AS_PUBLISHED:  # one thing corrected is enough
+        less = {k: v for k, v in runs.AS_PUBLISHED.items() if k != key}
         assert runs.control_of(runs.Case("c", sets=less), {"controller": "thesis"}) == "thesis corrected"
     assert runs.control_of(runs.Case("c"), {"controller": "scheduled"}) == "scheduled"
 
@@ -226,7 +229,7 @@ def test_runs_have_twenty_seeds_and_a_minute_or_the_page_says_so(root):
 
 # A sample of the committed numbers, run again: (experiment, case). The first seed.
 SAMPLE = (
-    (control, "full, printed EKF, 1 Hz and 10 cm/s"),
+    (control, "full, published EKF, 1 Hz and 10 cm/s"),
     (control, "simulation (6.22)"),
     (vibration, "5 cm/s"),
     (bridge_modes, "full, coast, compensated, 1000 Hz"),
@@ -261,7 +264,7 @@ def test_unknown_names_are_refused():
 
 def test_the_quick_experiments_run(tmp_path):
     lab = runs.Lab(seeds=2)
-    for name in ("geometry", "motor_selection", "friction_identification", "printed_gains"):
+    for name in ("geometry", "motor_selection", "friction_identification", "published_gains"):
         module = framework.load(name)
         data.write(name, module.measure(lab), tmp_path)
         assert module.report(data.read(name, tmp_path), tmp_path).findings
@@ -271,16 +274,16 @@ def test_planar_model_has_the_known_spectral_radii():
     """Independent computation: corrected sign 0.9992, 0.994, 0.996, 0.9987 at 0, 0.5, 0.75, 1 Hz; "
     "printed sign falls."""
     for hz, known in ((0, 0.9992), (0.5, 0.994), (0.75, 0.996), (1, 0.9987)):
-        gains = printed_gains.GAINS[f"Table 6.3, {hz:g} Hz"]
+        gains = published_gains.GAINS[f"Table 6.3, {hz:g} Hz"]
         right, wrong = (
-            np.abs(np.linalg.eigvals(printed_gains.closed_loop("derived", gains, sign)[0])).max()
+            np.abs(np.linalg.eigvals(published_gains.closed_loop("derived", gains, sign)[0])).max()
             for sign in (1, -1)
         )
         assert right == pytest.approx(known, abs=7e-4)
         assert 1.002 < wrong < 1.0055
 
 
-def test_the_printed_kf_is_its_recursion_and_stable():
+def test_the_published_kf_is_its_recursion_and_stable():
     """Predict, then correct with the steady gain, tick by tick; the pendulum itself falls, its filter "
     "does not."""
     random = np.random.default_rng(1)
@@ -293,9 +296,9 @@ def test_the_printed_kf_is_its_recursion_and_stable():
         log[names.SENSORS][channel] = random.normal(0, 20, log[names.SENSORS][channel].shape)
     log[names.MOTORS] = np.zeros(ticks, [("u_lin", "f8", 3)])
     log[names.MOTORS]["u_lin"] = random.normal(0, 0.1, (ticks, 3))
-    F, G, H, D = printed_kf.model()
-    K = printed_kf.steady_gain(F, H)
-    y = printed_kf.measurements(log, np.eye(3))
+    F, G, H, D = published_kf.model()
+    K = published_kf.steady_gain(F, H)
+    y = published_kf.measurements(log, np.eye(3))
     x, u = np.zeros(8), np.zeros(2)
     expected = []
     for k in range(ticks):
@@ -303,7 +306,7 @@ def test_the_printed_kf_is_its_recursion_and_stable():
         x = x + K @ (y[k] - H @ x - D @ u)
         expected.append(x)
         u = log[names.MOTORS]["u_lin"][k, :2]
-    assert printed_kf.estimate(log, np.eye(3)) == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
+    assert published_kf.estimate(log, np.eye(3)) == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
     assert np.abs(np.linalg.eigvals((np.eye(8) - K @ H) @ F)).max() < 1.0 < np.abs(np.linalg.eigvals(F)).max()
 
 

@@ -1,6 +1,6 @@
 """python -m equipoise_tools.calibrate_disturbance [--evaluations N] [--seed N] [--out FILE]
 
-Finds the magnitudes of the simulated disturbances with which the printed EKF, with the noise of [T] (6.28),
+Finds the magnitudes of the simulated disturbances with which the published EKF, with the noise of [T] (6.28),
 makes the errors of [T] Table 6.1. Its estimates also control, as in [T], but through the scheduled gains;
 with (6.29) the robot falls. Evolution strategy with a learned covariance; the misfit is how far each of the
 fourteen errors lies outside +-20 %.
@@ -18,21 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
+from . import published
 from .entry import leave
 from .experiments.runs import simulate, summarise
 from .paths import UserError, repository_root
 
-PUBLISHED_Q = "[1e-5, 1e-5, 1e-5, 0.1, 0.1, 0.1, 0.1, 2.0, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3]"  # (6.28)
 # Yaw rate in Hz, drive speed in m/s, RMSE of the attitude in rad and of the ball speed in m/s.
-TABLE_6_1 = (
-    (0.0, 0.20, 0.031, 0.096),
-    (0.0, 0.0, 0.017, 0.083),
-    (0.5, 0.0, 0.056, 0.13),
-    (1.0, 0.0, 0.065, 0.19),
-    (0.25, 0.10, 0.036, 0.099),
-    (0.5, 0.10, 0.057, 0.14),
-    (1.0, 0.05, 0.077, 0.21),
-)
+TABLE_6_1 = tuple(map(tuple, published.table()["Table 6.1"]["rows"]))
 WITHIN = 1.20
 DURATION_S = 15.0
 FALLEN = 10.0
@@ -65,8 +57,7 @@ def settings(x: dict[str, float]) -> dict[str, str]:
     sets[D + "imu_misalignment_rad"] = f"[{x['misalignment_x']:.4g}, {x['misalignment_y']:.4g}, 0.0]"
     sets[D + "wheel_torque_scale"] = "[1.0575, 0.9425, 1.0]"  # 11.5 %, [T] section 5.3
     sets["robot.imu_position_m"] = f"[{x['imu_x']:.4g}, {x['imu_y']:.4g}, 0.13]"  # [T] takes x, y for zero
-    sets["estimator.ekf13_published.q"] = PUBLISHED_Q
-    return sets
+    return sets | published.ekf("(6.28)")
 
 
 def options(row: tuple, duration_s: float, seed: int) -> dict:
@@ -161,7 +152,7 @@ def search(evaluations: int, seed: int, duration_s: float, jobs: int) -> tuple[d
 def fragment(best: dict[str, float], left: float, command: str) -> str:
     """TOML that a configuration includes."""
     lines = [
-        "# Disturbances with which the printed EKF makes the errors of [T] Table 6.1; not for the robot.",
+        "# Disturbances with which the published EKF makes the errors of [T] Table 6.1; not for the robot.",
         f"# Written by: {command}; misfit left {left:.4f} (0: every error within 20 %).",
     ]
     tables: dict[str, list[str]] = {}

@@ -15,29 +15,29 @@ import numpy as np
 from . import coverage
 from .data import Data, Ran
 
-_NOT_EXPERIMENTS = {"__main__", "framework", "coverage", "runs", "data", "timeplot", "printed_kf"}
+_NOT_EXPERIMENTS = {"__main__", "framework", "coverage", "runs", "data", "timeplot", "published_kf"}
 
-PRINTED, CORRECTED, FITTED = "as printed", "with our correction", "input or fitted"
+PUBLISHED, CORRECTED, FITTED = "as published", "with our correction", "input or fitted"
 REFUTED, NOT_SHOWN = "refuted", "not shown"
 STATUSES = {
-    PRINTED: "the statement holds with the filter, controller and gains that [T] prints",
-    CORRECTED: "it holds once something of ours stands in for what is printed; the page says what",
+    PUBLISHED: "the statement holds with the filter, controller and gains that [T] publishes",
+    CORRECTED: "it holds once something of ours replaces what is published; the page says what",
     FITTED: "it holds because a number was put in or fitted; no evidence for the statement",
-    REFUTED: "it follows from what [T] prints, and what [T] prints does not bear it out",
-    NOT_SHOWN: "it is not borne out here, or nothing here can test it; not shown to be false",
+    REFUTED: "it follows from what [T] publishes, and does not hold with it",
+    NOT_SHOWN: "it does not hold here, or cannot be tested here; not shown to be false",
 }
-# What [T] prints. Everything else in a run is ours.
-PRINTED_FILTERS = {
+# What [T] publishes. Everything else in a run is ours.
+PUBLISHED_FILTERS = {
     "-",
     "ekf13_published",
     "ekf_published",
     "planar_kf",
     "complementary",
     "complementary_kf",
-    "kf_attitude as printed",
-    "kf as printed",
+    "kf_attitude as published",
+    "kf as published",
 }
-PRINTED_CONTROL = {"-", "thesis as printed", "slc as printed"}
+PUBLISHED_CONTROL = {"-", "thesis as published", "slc as published"}
 CLAIMS = ("[T]", "ours")
 RELATIONS = {
     "at least": lambda measured, limit: measured >= limit[0],
@@ -50,16 +50,16 @@ def standing(ran: Ran) -> str:
     if ran.fitted:
         return FITTED
     of_t = (
-        ran.filter in PRINTED_FILTERS
-        and ran.control in PRINTED_CONTROL
+        ran.filter in PUBLISHED_FILTERS
+        and ran.control in PUBLISHED_CONTROL
         and ran.gains.startswith(("-", "[T]"))
     )
-    return PRINTED if of_t else CORRECTED
+    return PUBLISHED if of_t else CORRECTED
 
 
 @dataclass
 class Value:
-    """One quantity over the seeds beside [T]'s; `printed` is None where [T] has no number."""
+    """One quantity over the seeds beside [T]'s; `published` is None where [T] has no number."""
 
     target: str
     what: str
@@ -68,12 +68,12 @@ class Value:
     low: float | None  # 5 and 95 % over the seeds; None: one evaluation
     high: float | None
     runs: int
-    printed: float | None = None
+    published: float | None = None
     unit: str = ""
 
     @property
     def ratio(self) -> float | None:
-        return self.median / self.printed if self.median is not None and self.printed else None
+        return self.median / self.published if self.median is not None and self.published else None
 
 
 @dataclass
@@ -159,7 +159,7 @@ class Result:
         case: str,
         quantity: str,
         filter_name: str | None = None,
-        printed: float | None = None,
+        published: float | None = None,
         unit: str = "",
         scale: float = 1.0,
     ) -> None:
@@ -170,7 +170,7 @@ class Result:
             median = float(np.median(values))
         if values.size > 1:
             low, high = (float(x) for x in np.percentile(values, (5, 95)))
-        self.values.append(Value(target, what, ran, median, low, high, int(values.size), printed, unit))
+        self.values.append(Value(target, what, ran, median, low, high, int(values.size), published, unit))
 
 
 def names() -> list[str]:
@@ -195,7 +195,7 @@ def status(findings: list[Finding]) -> str:
     claims = [f for f in findings if f.claim == "[T]"]
     if not claims:
         return NOT_SHOWN
-    if any(f.derived and not f.holds and standing(f.ran) == PRINTED for f in claims):
+    if any(f.derived and not f.holds and standing(f.ran) == PUBLISHED for f in claims):
         return REFUTED
     borne_out = {f.text for f in claims if f.holds}
     if any(f.text not in borne_out for f in claims):
@@ -204,7 +204,7 @@ def status(findings: list[Finding]) -> str:
     used = {standing(f.ran) for f in claims if f.holds}
     if FITTED in used:
         return FITTED
-    return CORRECTED if CORRECTED in used or first_failed else PRINTED
+    return CORRECTED if CORRECTED in used or first_failed else PUBLISHED
 
 
 def reason(findings: list[Finding]) -> str:
@@ -267,7 +267,7 @@ def page(name: str, result: Result) -> str:
         lines += [
             f"| {v.target} | {v.what} | {v.ran} | {number(v.median)} | "
             f"{'–' if v.low is None else f'{number(v.low)} to {number(v.high)}'} | {v.runs} | "
-            f"{number(v.printed)} | {number(v.ratio)} | {v.unit} |"
+            f"{number(v.published)} | {number(v.ratio)} | {v.unit} |"
             for v in result.values
         ]
     lines += ["", f"Why they differ: {result.differs}", ""]
@@ -292,11 +292,11 @@ def write(name: str, result: Result, out_dir: Path) -> None:
     with (out_dir / f"{name}.csv").open("w", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
         head = (
-            "target quantity filter control world gains fitted median low_5 high_95 runs printed ratio unit"
+            "target quantity filter control world gains fitted median low_5 high_95 runs published ratio unit"
         )
         rows.writerow(head.split())
         for v in result.values:
-            shown = (v.median, v.low, v.high, v.runs, v.printed, v.ratio)
+            shown = (v.median, v.low, v.high, v.runs, v.published, v.ratio)
             cells = ["" if x is None else f"{x:.6g}" for x in shown]
             ran = [v.ran.filter, v.ran.control, v.ran.world, v.ran.gains, v.ran.fitted]
             rows.writerow([v.target, v.what, *ran, *cells, v.unit])

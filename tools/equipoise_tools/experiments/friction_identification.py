@@ -103,11 +103,11 @@ def report(data: Data, out_dir: Path) -> Result:
         data=data,
     )
     for name, (true, printed, unit) in PUT_IN.items():
-        result.add("Fig. 5.3", name, "as identified", name, printed=printed, unit=unit)
+        result.add("Fig. 5.3", name, "as identified", name, published=printed, unit=unit)
         text = f"{name}: {true:g} put in comes back within {5 if 'viscous' in name else 2} %, median"
         limit = 5.0 if "viscous" in name else 2.0
         result.check("Fig. 5.3", text, "as identified", f"{name}_error_percent", at_most=limit, claim="ours")
-    result.add("Fig. 5.3", "R²", "as identified", "r_squared", printed=0.93)
+    result.add("Fig. 5.3", "R²", "as identified", "r_squared", published=0.93)
     text = "Coulomb and viscous friction explain the sweep, R² 0.9 or more"
     result.check("Fig. 5.3", text, "as identified", "r_squared", at_least=0.9)
     text = "Coulomb friction within 2 % despite stiction"

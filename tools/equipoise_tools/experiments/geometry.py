@@ -89,7 +89,7 @@ def report(data: Data, out_dir: Path) -> Result:
     )
     for latitude, printed in TABLE_2_1.items():
         case = alpha(latitude)
-        result.add("Table 2.1", f"β at α = {latitude}°", case, "beta_deg", printed=printed, unit="deg")
+        result.add("Table 2.1", f"β at α = {latitude}°", case, "beta_deg", published=printed, unit="deg")
         text = f"α = {latitude}°: the printed tilt makes the axes orthogonal within 0.1°"
         result.check("Table 2.1", text, case, "printed_axes_not_orthogonal_deg", at_most=0.1, derived=True)
         text = f"closed form orthonormal to 1e-12 at {latitude}°"
@@ -98,7 +98,7 @@ def report(data: Data, out_dir: Path) -> Result:
         text = f"(6.5) row {axis} to its printed digits"
         result.check("(6.5)", text, f"(6.5) row {axis}", "largest_difference", at_most=1e-4, derived=True)
         result.add(
-            "(6.5)", f"length of printed row {axis}", f"(6.5) row {axis}", "printed_length", printed=1.0
+            "(6.5)", f"length of printed row {axis}", f"(6.5) row {axis}", "printed_length", published=1.0
         )
     result.add("(2.2)", "load per wheel over weight at 45°", alpha(45), "normal_force_over_weight")
     result.add("(2.2)", "load per wheel over weight at 70°", alpha(70), "normal_force_over_weight")

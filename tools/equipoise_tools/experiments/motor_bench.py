@@ -51,7 +51,7 @@ RMSE_LINEAR = {
 }
 
 FITTED = "motors obey the bridge's equations with known parameters; flywheel, amplitudes, sensor are ours"
-# Motor 2 of Table 4.3, and what its 0.0494 mH must be for the linear model to fall as printed.
+# Motor 2 of Table 4.3, and what its 0.0494 mH must be for the linear model to fall as published.
 R_2, K_2, L_2_H, SUPPLY_V = 15.4, 0.161, 0.0494e-3, 12.0
 L_FACTORS = (1, 10, 20)
 
@@ -177,20 +177,22 @@ def report(data: Data, out_dir: Path) -> Result:
                 ):
                     name = model.replace("_", "/")
                     printed = r2[key][at] if key in r2 else None
-                    result.add("Table 4.4", f"R² {name}, {case}", case, f"{model}_r_squared", printed=printed)
+                    result.add(
+                        "Table 4.4", f"R² {name}, {case}", case, f"{model}_r_squared", published=printed
+                    )
                     printed = rmse[key][at] if key in rmse else None
                     what = f"RMSE {name}, {case}"
                     result.add(
-                        "Table 4.5", what, case, f"{model}_rmse_percent", printed=printed, unit="% of stall"
+                        "Table 4.5", what, case, f"{model}_rmse_percent", published=printed, unit="% of stall"
                     )
     mean_r2 = float(np.mean(list(R2_COAST.values())))
-    result.add("Table 4.4", "mean R² drive/coast", "all cells", "drive_coast_r_squared", printed=mean_r2)
+    result.add("Table 4.4", "mean R² drive/coast", "all cells", "drive_coast_r_squared", published=mean_r2)
     mean_linear = float(np.mean(list(R2_LINEAR.values())))
-    result.add("Table 4.4", "mean R² linear", "all cells", "linear_r_squared", printed=mean_linear)
+    result.add("Table 4.4", "mean R² linear", "all cells", "linear_r_squared", published=mean_linear)
     for model, printed in (("drive_coast", 6.5), ("linear", 22.5)):
         what = f"mean RMSE {model.replace('_', '/')}"
         result.add(
-            "Table 4.5", what, "all cells", f"{model}_rmse_percent", printed=printed, unit="% of stall"
+            "Table 4.5", what, "all cells", f"{model}_rmse_percent", published=printed, unit="% of stall"
         )
     text = "drive/coast model beats the linear one in every cell"
     result.check("Table 4.4", text, "all cells", "smallest_gain_in_r_squared", at_least=0.01)
@@ -211,7 +213,9 @@ def report(data: Data, out_dir: Path) -> Result:
     text = "cell 0.650 (motor 1, driver 2, 10 kHz) is what its RMSE means, within 8 %"
     over = ("printed 0.650", "printed_r_squared", "-")
     quantity = "r_squared_that_its_rmse_means"
-    result.add("Table 4.4", "R² that the RMSE of cell 0.650 means", "printed 0.650", quantity, printed=0.650)
+    result.add(
+        "Table 4.4", "R² that the RMSE of cell 0.650 means", "printed 0.650", quantity, published=0.650
+    )
     result.check("Table 4.4", text, "printed 0.650", quantity, between=(0.92, 1.08), over=over, claim="ours")
     text = "the linear model errs at least three times as much"
     over = ("all cells", "drive_coast_rmse_percent", "-")

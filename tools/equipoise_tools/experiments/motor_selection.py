@@ -69,18 +69,20 @@ def report(data: Data, out_dir: Path) -> Result:
         data=data,
     )
     result.add(
-        "Fig. 2.10", "torque of 12:1 at 600 rpm", "12:1", "torque_at_600_rpm_N_m", printed=0.06, unit="N m"
+        "Fig. 2.10", "torque of 12:1 at 600 rpm", "12:1", "torque_at_600_rpm_N_m", published=0.06, unit="N m"
     )
     result.add(
-        "Fig. 2.10", "speed of 12:1 at 0.06 N m", "12:1", "speed_at_0.06_N_m_rpm", printed=600.0, unit="rpm"
+        "Fig. 2.10", "speed of 12:1 at 0.06 N m", "12:1", "speed_at_0.06_N_m_rpm", published=600.0, unit="rpm"
     )
     result.check("Fig. 2.10", "12:1 covers the region", "12:1", "torque_at_600_rpm_N_m", at_least=REGION_N_M)
     quantity = "gear_with_most_torque_at_600_rpm"
-    result.add("Fig. 2.10", "gear with the most torque at 600 rpm", "2.3.3", quantity, printed=12.0)
+    result.add("Fig. 2.10", "gear with the most torque at 600 rpm", "2.3.3", quantity, published=12.0)
     text = "50:1 gives less than the region's torque at 600 rpm"
     result.check("Fig. 2.10", text, "50:1", "torque_at_600_rpm_N_m", at_most=REGION_N_M, claim="ours")
     quantity = "speed_at_600_rpm_m_s"
-    result.add("2.3.3", "robot's speed at 600 rpm of the wheels", "2.3.3", quantity, printed=1.5, unit="m/s")
+    result.add(
+        "2.3.3", "robot's speed at 600 rpm of the wheels", "2.3.3", quantity, published=1.5, unit="m/s"
+    )
     text = "600 rpm of the wheel drive at about 1.5 m/s (within 20 %)"
     result.check("2.3.3", text, "2.3.3", quantity, between=(1.2, 1.8), derived=True)
     text = "600 rpm of the wheel are about four turns of the ball a second (within 20 %)"
@@ -88,7 +90,12 @@ def report(data: Data, out_dir: Path) -> Result:
     result.check("2.3.3", text, "2.3.3", quantity, between=(0.8, 1.2), over=over, derived=True)
     quantity = "torque_at_30_degrees_N_m"
     result.add(
-        "2.3.3", "torque of the most loaded wheel at 30° of lean", "2.3.3", quantity, printed=0.06, unit="N m"
+        "2.3.3",
+        "torque of the most loaded wheel at 30° of lean",
+        "2.3.3",
+        quantity,
+        published=0.06,
+        unit="N m",
     )
     text = "0.06 N m is a generous estimate for 30° of lean"
     result.check("2.3.3", text, "2.3.3", quantity, at_most=0.06, derived=True)

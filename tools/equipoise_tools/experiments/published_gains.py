@@ -1,4 +1,4 @@
-"""6.2, 6.3: do the printed gains and signs balance the planar model? (6.13), (6.22), (6.27), (6.29), "
+"""6.2, 6.3: do the published gains and signs balance the planar model? (6.13), (6.22), (6.27), (6.29), "
 "Fig. 6.3."""
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import expm
 
-from .. import style
+from .. import published, style
 from ..style import plt
 from .data import TRACE_HZ, Data, Ran
 from .framework import Result
@@ -16,23 +16,30 @@ from .runs import Lab
 
 COVERS = ("(6.13)", "(6.22)", "(6.27)", "(6.29)", "Table 6.3, planar", "Fig. 6.3")
 DT_S = 0.005
-# theta'', phi'' = row . (theta, theta', phi', u): (5.28) as printed, and the exact model's (errata.md).
+# theta'', phi'' = row . (theta, theta', phi', u): (5.28) as published, and the exact model's (errata.md).
 MODELS = {
-    "(5.28) as printed": ((130, -8.9, 8.9, -130), (-280, 34, -34, 410)),
+    "(5.28) as published": (
+        published.table()["(5.28)"]["theta_ddot"],
+        published.table()["(5.28)"]["phi_ddot"],
+    ),
     "derived": ((129.1, -9.09, 9.09, -133.0), (-277.4, 34.4, -34.4, 501.6)),
 }
-# c1, c2, c3, c4, SLC gain and pole, low-pass in rad/s (0: none).
-GAINS = {
-    "(6.22)": (14, 2, 0.6, 1.2, 0.25, 0.961, 0),
-    "(6.27)": (8.5, 0.3, 0.4, 0.65, 0.2, 0.961, 0),
-    "(6.29)": (6.4, 0.19, 0.13, 0.0125, 0.39, 0.961, 0),
-    "Table 6.3, 0 Hz": (10, 0.4, 0.5, 0.075, 0.20, 0.970, 10),
-    "Table 6.3, 0.5 Hz": (12, 0.4, 0.5, 0.10, 0.20, 0.968, 10),
-    "Table 6.3, 0.75 Hz": (14, 0.4, 0.6, 0.10, 0.15, 0.963, 10),
-    "Table 6.3, 1 Hz": (14, 0.5, 0.6, 0.085, 0.10, 0.960, 15),
-    "Table 6.3, 1.5 Hz": (12, 0.6, 0.5, 0.060, 0.10, 0.951, 20),
-}
-SLC_UNIT = 0.000985
+FIXED = ("(6.22)", "(6.27)", "(6.29)")
+
+
+def published_rows() -> dict[str, tuple]:
+    """c1, c2, c3, c4, SLC gain and pole, low-pass filter in rad/s (0: none)."""
+    keys = ("c1", "c2", "c3", "c4", "slc_gain", "slc_pole")
+    rows = {name: (*(published.table()[name][key] for key in keys), 0.0) for name in FIXED}
+    scheduled = published.table()["Table 6.3"]
+    for i, hz in enumerate(scheduled["yaw_hz"]):
+        corner = published.table()["6.2.1"]["low_pass_rad_s"][i]
+        rows[f"Table 6.3, {hz:g} Hz"] = (*(scheduled[key][i] for key in keys), corner)
+    return rows
+
+
+GAINS = published_rows()
+SLC_UNIT = published.table()["(6.13)"]["slc_unit_rad_per_rad_s"]
 SIGNS = {"-": -1.0, "+": 1.0}
 
 
@@ -81,10 +88,10 @@ def measure(lab: Lab) -> Data:
     data = Data()
     for name, gains in GAINS.items():
         for model in MODELS:
-            ran = Ran(control="thesis as printed", world=f"planar model {model}", gains=f"[T] {name}")
+            ran = Ran(control="thesis as published", world=f"planar model {model}", gains=f"[T] {name}")
             data.add(f"{name}, {model}", "sum_of_poles_1_s", growth_rate(model, gains), ran)
             for label, sign in SIGNS.items():
-                control = "thesis as printed" if sign < 0 else "thesis corrected"
+                control = "thesis as published" if sign < 0 else "thesis corrected"
                 ran = Ran(control=control, world=f"planar model {model}", gains=f"[T] {name}")
                 M, _ = closed_loop(model, gains, sign)
                 radius = float(np.abs(np.linalg.eigvals(M)).max())
@@ -108,11 +115,11 @@ def measure(lab: Lab) -> Data:
 
 def report(data: Data, out_dir: Path) -> Result:
     result = Result(
-        title="Printed gains and signs on the planar model ((6.13), (6.22), (6.27), (6.29), Fig. 6.3)",
-        command="tools/experiments printed_gains",
+        title="Published gains and signs on the planar model ((6.13), (6.22), (6.27), (6.29), Fig. 6.3)",
+        command="tools/experiments published_gains",
         method="Feedback (6.10) with the SLC (6.13) and the low-pass, at 200 Hz, on the planar model "
         "with held inputs: "
-        "(5.28) as printed, and with the coefficients that the exact model has (410 there is 502). A "
+        "(5.28) as published, and with the coefficients that the exact model has (410 there is 502). A "
         "spectral radius "
         "above 1 falls. The sum of the poles of the feedback alone decides without any doubt: above 0, "
         "unstable.",
@@ -122,9 +129,9 @@ def report(data: Data, out_dir: Path) -> Result:
         data=data,
     )
     for name in ("(6.22)", "(6.27)"):
-        case = f"{name}, (5.28) as printed"
+        case = f"{name}, (5.28) as published"
         result.add(name, "sum of the closed loop's poles", case, "sum_of_poles_1_s", unit="1/s")
-        text = f"the gains {name} balance the printed planar model"
+        text = f"the gains {name} balance the published planar model"
         result.check(name, text, case, "sum_of_poles_1_s", at_most=0.0, derived=True)
     for name in GAINS:
         target = name if name in COVERS else "Table 6.3, planar"
@@ -137,15 +144,20 @@ def report(data: Data, out_dir: Path) -> Result:
         text = f"the gains (6.29) balance the robot of Table 5.2, sign {label} in (6.13)"
         case = f"(6.29), derived, SLC {label}"
         result.check("(6.29)", text, case, "spectral_radius", at_most=1.0, derived=True, claim=claim)
-    for hz in (0, 0.5, 0.75, 1):
+    for hz in published.table()["Table 6.3"]["yaw_hz"]:
         name = f"Table 6.3, {hz:g} Hz"
         text = f"the gains of Table 6.3 at {hz:g} Hz balance the planar model"
         result.check("Table 6.3, planar", text, f"{name}, derived, SLC +", "spectral_radius", at_most=1.0)
-        text = f"(6.13) with its printed sign balances (5.28), {name}"
+        text = f"(6.13) with its published sign balances (5.28), {name}"
         result.check(
-            "(6.13)", text, f"{name}, (5.28) as printed, SLC -", "spectral_radius", at_most=1.0, claim="ours"
+            "(6.13)",
+            text,
+            f"{name}, (5.28) as published, SLC -",
+            "spectral_radius",
+            at_most=1.0,
+            claim="ours",
         )
-        text = f"(6.13) with its printed sign balances the robot of Table 5.2, {name}"
+        text = f"(6.13) with its published sign balances the robot of Table 5.2, {name}"
         result.check("(6.13)", text, f"{name}, derived, SLC -", "spectral_radius", at_most=1.0, derived=True)
         text = f"with the sign turned it balances, {name}"
         result.check("(6.13)", text, f"{name}, derived, SLC +", "spectral_radius", at_most=1.0, claim="ours")

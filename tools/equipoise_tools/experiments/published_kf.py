@@ -1,4 +1,4 @@
-"""The linear Kalman filter as [T] prints it, (5.27)-(5.29), on the samples of a log: attitude and ball "
+"""The linear Kalman filter of [T] as published, (5.27)-(5.29), on the samples of a log: attitude and ball "
 "speed."""
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ import numpy as np
 from equipoise_robot.log import Log
 from scipy.signal import lfilter
 
-from .. import names
+from .. import names, published
 
 DT_S = 0.005
 # Table 5.2 and (6.5), exact; config/mbbr.toml [calibration].
@@ -15,10 +15,9 @@ BALL_RADIUS_M, WHEEL_RADIUS_M = 0.032, 0.0125
 GYRO_RAD_S = np.radians(1 / 16.4)
 ACCEL_M_S2 = 9.8 / 4096
 WHEEL_RAD = 2 * np.pi / 720
-Q = (1e-5, 1e-5, 1e-4, 1e-4, 0.1, 0.1, 1e-3, 1e-3)  # (6.32)
-R = (2.08e-6, 2.08e-6, 7.62e-5, 7.62e-5, 1.41, 1.41)  # (6.23)
-PLANAR = ((130, -8.9, 8.9, -130), (-280, 34, -34, 410))  # theta, theta', phi', u
-ACCEL = (4.6, -0.5, 0.5, -7.8)
+Q, R = published.table()["(6.32)"]["q_kf"], published.table()["(6.23)"]["r_kf"]
+PLANAR = (published.table()["(5.28)"]["theta_ddot"], published.table()["(5.28)"]["phi_ddot"])
+ACCEL = published.table()["(5.29)"]["accel"]
 
 
 def model() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from equipoise_robot.log import Log, read_log
 
-from .. import metrics, names
+from .. import metrics, names, published
 from ..paths import UserError, repository_root
 from .data import Data, Ran, thinned
 
@@ -27,18 +27,16 @@ NO_GATES = {
     "safety.encoder_check_drive": 0,
     "safety.encoder_probe_drive": 0,
 }
-# (6.13)'s sign, Euler-angle rates, filters in the yaw frame, no feed-forward of back-EMF.
-AS_PRINTED = {
-    "reference.slc_sign": -1,
-    "reference.rate_feedback": '"euler"',
-    "reference.filter_frame": '"yaw"',
-    "controller.thesis.yaw_feedforward_s": 0,
-}
+AS_PUBLISHED = published.control()
 
 
 # Filters that take an attitude from the simulated packets: its error is put in.
 PACKETS = "attitude packets' noise of 0.010 rad, from Table 3.3"
-PUT_IN = {"attitude": PACKETS, "kf_attitude": PACKETS}
+PUT_IN = {
+    "attitude": PACKETS,
+    "kf_attitude": PACKETS,
+    "prediction (5.33)": "the friction term that jumps is put into the prediction",
+}
 
 
 def binary() -> Path:
@@ -92,6 +90,7 @@ class Case:
     config: str = MBBR
     sets: dict = field(default_factory=dict)
     options: dict = field(default_factory=dict)
+    section: str = ""  # equation of the published EKF's process noise; needed where that filter runs
     gains: str = ""  # of [T], where not the configuration's
     fitted: str = ""
     measure: Callable[[Log, dict], dict] | None = None
@@ -99,14 +98,26 @@ class Case:
     trace_s: tuple[float, float] = (0.0, 30.0)
     seeds: tuple[int, ...] | None = None
 
+    @property
+    def settings(self) -> dict[str, object]:
+        return {**(published.ekf(self.section) if self.section else {}), **self.sets}
+
+
+def filter_of(case: Case, name: str) -> str:
+    return f"{name} as published" if name == "kf_attitude" and is_kf_published(case) else name
+
+
+def is_kf_published(case: Case) -> bool:
+    return all(str(case.sets.get(key)) == value for key, value in published.kf().items())
+
 
 def control_of(case: Case, summary: dict) -> str:
     controller = summary["controller"]
     if controller == "thesis":
-        printed = all(str(case.sets.get(key)) == str(value) for key, value in AS_PRINTED.items())
-        return "thesis as printed" if printed else "thesis corrected"
+        same = all(str(case.sets.get(key)) == str(value) for key, value in AS_PUBLISHED.items())
+        return "thesis as published" if same else "thesis corrected"
     if controller == "slc":
-        return "slc as printed" if case.sets.get("controller.slc.published") == "true" else "slc redesigned"
+        return "slc as published" if case.sets.get("controller.slc.published") == "true" else "slc redesigned"
     return controller
 
 
@@ -130,17 +141,21 @@ def rows_of(case: Case, seed: int, traced: bool) -> Data:
     data = Data()
     options = {**case.options, "seed": seed}
     log = None
+    published_runs = options.get("estimator") == "ekf13_published" or options.get("compare")
+    if published_runs and case.config == MBBR and not case.section:
+        raise UserError(f"{case.name}: which equation's noise does the published EKF run with?")
     if case.measure is not None or (traced and case.trace is not None):
-        summary, log = simulate(case.config, case.sets, **options)
+        summary, log = simulate(case.config, case.settings, **options)
     else:
-        summary = summarise(case.config, case.sets, **options)
+        summary = summarise(case.config, case.settings, **options)
     own = summary["estimator"]
     control, gains = control_of(case, summary), gains_of(case, summary)
 
     def note(name: str, quantity: str, value: float | None) -> None:
-        judged = name or own
-        shown = control if judged == own else f"{control} on {own}"
-        ran = Ran(judged, shown, summary["fidelity"], gains, case.fitted or PUT_IN.get(judged, ""))
+        judged = filter_of(case, name or own)
+        own_shown = filter_of(case, own)
+        shown = control if judged == own_shown else f"{control} on {own_shown}"
+        ran = Ran(judged, shown, summary["fidelity"], gains, case.fitted or PUT_IN.get(name or own, ""))
         data.add(case.name, quantity, np.nan if value is None else value, ran, seed, summary["duration_s"])
 
     note("", "upright_s", upright_s(summary))

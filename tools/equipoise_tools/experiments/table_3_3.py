@@ -98,7 +98,7 @@ def report(data: Data, out_dir: Path) -> Result:
         "--yaw-rad-s 5 --duration-s 60",
         method=f"{DURATION_S:.0f} s at 0, 5 and 10 rad/s; every estimator on the same samples, against the "
         "plant's truth after 5 s. As in [T] the attitude packets control, through our 200 Hz redesign of the "
-        "balance loop ((3.50), (3.51) are unstable as printed). Two numbers were put in with this table in "
+        "balance loop ((3.50), (3.51) are unstable as published). Two numbers were put in with this table in "
         "view: the packets' noise (0.010 rad: the DMP's row) and the IMU's place, 16 mm behind the "
         "centre of mass, "
         "which is atan(0.016 w²/g) = 0.16 rad at 10 rad/s: the complementary filters' last column.",

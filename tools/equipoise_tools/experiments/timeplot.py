@@ -14,7 +14,7 @@ from ..style import plt
 from .data import TRACE_HZ, Data
 
 # What a trace holds of each filter; the suffix of a series.
-SHOWN = ("theta_x", "theta_y", "speed_x", "speed_y", "x", "y", "heading")
+SHOWN = ("theta_x", "theta_y", "speed_x", "speed_y", "x", "y", "heading", "turn")
 
 
 def series_of(log: Log, channels: dict[str, str], position: bool = True) -> dict:
@@ -35,12 +35,14 @@ def series_of(log: Log, channels: dict[str, str], position: bool = True) -> dict
         }
         if position:
             columns["x"], columns["y"] = records["position_W_m"].T
+            columns["heading"] = np.unwrap(records["theta_rad"][:, 2])
+            columns["turn"] = figures.smoothed(records["omega_B_rad_s"][:, 2], 0.005)
         found |= {f"{label} {name}": (t_s, values) for name, values in columns.items()}
     return found
 
 
 COLOURS = {"truth": style.TRUTH, "reference": style.REFERENCE}
-UNITS = {"theta": "rad", "speed": "cm/s", "": "m"}
+UNITS = {"theta": "rad", "speed": "cm/s", "heading": "rad", "turn": "rad/s"}
 
 
 def draw(
@@ -49,7 +51,7 @@ def draw(
     """Rows attitude, ball speed and, where recorded, position; then the attitude's error."""
     rows = [("theta_x", "theta_y"), ("speed_x", "speed_y")]
     if any(series.endswith((" x", " y")) for named, series in data.traces if named == case):
-        rows.append(("x", "y"))
+        rows += [("x", "y"), ("heading", "turn")]
     estimates = [label for label in labels if label not in COLOURS]
     with plt.rc_context(style.RC):
         figure, panels = plt.subplots(
@@ -72,7 +74,7 @@ def draw(
                         zorder=4 if label == "truth" else 3,
                         label=label,
                     )
-                unit = UNITS[quantity.partition("_")[0] if "_" in quantity else ""]
+                unit = UNITS.get(quantity.partition("_")[0], "m")
                 axes.set(ylabel=f"{quantity.replace('_', ' ')}, {unit}")
         for axes, quantity in zip(panels[-1], ("theta_x", "theta_y"), strict=True):
             truth = data.trace(case, f"truth {quantity}")
