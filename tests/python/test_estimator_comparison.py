@@ -165,6 +165,6 @@ def test_the_page_shows_what_the_data_say(root):
     """The tables of the page are those of its data."""
     from equipoise_tools.estimator_comparison import measure
 
-    text = (root / "docs/estimators.md").read_text()
+    text = (root / "docs/reports/estimators.md").read_text()
     shown = text.split(page.BEGIN, 1)[1].split(page.END, 1)[0].strip()
-    assert shown == page.tables(measure.read(root / "docs/estimators.csv")).strip()
+    assert shown == page.tables(measure.read(root / "docs/reports/estimators.csv")).strip()

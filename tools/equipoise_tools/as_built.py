@@ -1,8 +1,7 @@
-"""python -m equipoise_tools.as_built --mbbr DIR --mip DIR [--robots N] [--out DIR]
+"""python -m equipoise_tools.as_built --mbbr DIR --mip DIR [--robots N] [--steps-only] [--out DIR]
 
-The pictures and tables of docs/as-built.md: what it takes to keep a typical built robot upright (the same
-robots with one filter and controller after the other), and what comes of a whole population (two campaigns
-of tools/campaign, one per robot type).
+Writes docs/reports/as-built.md and its pictures: errors of whole populations (two campaigns of
+tools/campaign, one per robot type), and the same robots with one filter and controller after the other.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import numpy as np
 from . import style
 from .campaign import binary, read_parts
 from .campaign_page import _column, at_point, error_table, points_of, survival_table
-from .campaign_statistics import survival_over_time, wilson
+from .campaign_statistics import survival_over_time
 from .paths import UserError, repository_root
 from .style import plt
 
@@ -28,10 +27,10 @@ POINT = (1.0, 0.2)  # Hz, m/s
 DURATION_S = 60.0
 # What estimates and what controls, from the dissertation's to ours.
 STEPS = (
-    ("printed filter, printed gains", "ekf13_published", "thesis"),
-    ("printed filter corrected, printed gains", "ekf13", "thesis"),
-    ("the same, gains that know the delay", "ekf13", "scheduled"),
-    ("filter that knows delay, mount and scale", "ekf", "scheduled"),
+    ("published EKF, published gains", "ekf13_published", "thesis"),
+    ("corrected EKF, published gains", "ekf13", "thesis"),
+    ("corrected EKF, scheduled gains", "ekf13", "scheduled"),
+    ("default EKF (delay, mount, scale), scheduled gains", "ekf", "scheduled"),
 )
 LIMITS = {"attitude_rmse_rad": 0.010, "yaw_frame_speed_rmse_m_s": 0.015}  # 95 % of the robots, up to 1.5 Hz
 
@@ -122,55 +121,75 @@ def draw_population(rows: list[dict], out: Path) -> None:
         style.save(figure, out / "as_built_population")
 
 
-def draw_survival(campaigns: dict[str, list[dict]], out: Path) -> None:
-    with style.styled():
-        figure, axes = plt.subplots(figsize=(7, 3.4), layout="constrained")
-        for i, (name, rows) in enumerate(campaigns.items()):
-            points = points_of(rows)
-            counts = [(sum(not r["fell"] for r in at_point(rows, p)), len(at_point(rows, p))) for p in points]
-            shares = np.array([100 * k / n for k, n in counts])
-            bounds = np.array([[100 * x for x in wilson(k, n)] for k, n in counts])
-            spread = np.maximum(0.0, np.abs(bounds.T - shares))
-            axes.errorbar(
-                [p[0] for p in points],
-                shares,
-                yerr=spread,
-                fmt="os"[i],
-                capsize=4,
-                color=style.colour(i),
-                label=f"{name}, {max(n for _, n in counts)} robots",
-            )
-        axes.set(xlabel="yaw rate, turns a second", ylabel="upright for a minute, %")
-        axes.set_ylim(min(95.0, axes.get_ylim()[0]), 100.2)
-        style.legend_above(figure, axes)
-        style.save(figure, out / "as_built_survival")
+HEAD = """# Population of robots as built: tables
+Written by `python -m equipoise_tools.as_built` from two campaigns of `tools/campaign` ({robots}, one
+run of 60 s per robot and point, seed 1, world `full`, firmware of {commit}). No parameter was chosen
+on these robots. In brackets: 95 % interval. What the numbers mean: [as-built.md](../as-built.md).
+
+## Upright and errors
+"""
+STEPS_HEAD = "## Filter and controller, step by step\n"
+
+
+def commit() -> str:
+    command = ["git", "describe", "--always", "--dirty"]
+    done = subprocess.run(command, cwd=repository_root(), capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "an unknown commit"
+
+
+def population_part(campaigns: dict[str, list[dict]]) -> str:
+    robots = "; ".join(
+        f"{name} {min(r['robot'] for r in rows)} to {max(r['robot'] for r in rows)}"
+        for name, rows in campaigns.items()
+    )
+    tables = "\n".join(
+        "\n".join([f"{name}:", "", *survival_table(rows), "", *error_table(rows), ""])
+        for name, rows in campaigns.items()
+    )
+    picture = "![Errors over the population](as_built_population.png)\n\n"
+    return HEAD.format(robots=f"robots {robots}", commit=commit()) + tables + "\n" + picture
+
+
+def steps_part(found: list[tuple[str, list[dict]]], first: int) -> str:
+    where = f"{POINT[0]:g} Hz and {POINT[1]:g} m/s, {DURATION_S:.0f} s"
+    robots = f"The same {len(found[0][1])} robots ({first} to {first + len(found[0][1]) - 1}), {where}.\n\n"
+    picture = "\n\n![Robots still upright over time, step by step](as_built_steps.png)\n"
+    return STEPS_HEAD + robots + "\n".join(steps_table(found)) + picture
 
 
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m equipoise_tools.as_built", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--mbbr", type=Path, required=True, help="folder of a campaign with the MBBR")
-    parser.add_argument("--mip", type=Path, required=True, help="folder of a campaign with the eduMIP")
+    parser.add_argument("--mbbr", type=Path, help="folder of a campaign with the MBBR")
+    parser.add_argument("--mip", type=Path, help="folder of a campaign with the eduMIP")
     parser.add_argument("--robots", type=int, default=20, help="robots of the step-by-step comparison")
     parser.add_argument("--first-robot", type=int, default=201)
-    parser.add_argument("--out", type=Path, default=repository_root() / "docs" / "images")
+    parser.add_argument("--steps-only", action="store_true", help="leave the population's tables as they are")
+    parser.add_argument("--out", type=Path, default=repository_root() / "docs" / "reports")
     given = parser.parse_args(words)
+    if not given.steps_only and (given.mbbr is None or given.mip is None):
+        parser.error("--mbbr DIR and --mip DIR are needed, or --steps-only")
+    page = given.out / "as-built.md"
     try:
-        campaigns = {"MBBR": read_parts(given.mbbr), "eduMIP": read_parts(given.mip)}
-        for folder, rows in zip((given.mbbr, given.mip), campaigns.values(), strict=True):
-            if not rows:
-                raise UserError(f"{folder}: holds no trials; make them with tools/campaign --out {folder}")
-        found = steps(range(given.first_robot, given.first_robot + given.robots))
         given.out.mkdir(parents=True, exist_ok=True)
+        if given.steps_only:
+            population = page.read_text(encoding="utf-8").partition(STEPS_HEAD)[0]
+        else:
+            campaigns = {"MBBR": read_parts(given.mbbr), "eduMIP": read_parts(given.mip)}
+            for folder, rows in zip((given.mbbr, given.mip), campaigns.values(), strict=True):
+                if not rows:
+                    raise UserError(
+                        f"{folder}: holds no trials; make them with tools/campaign --out {folder}"
+                    )
+            draw_population(campaigns["MBBR"], given.out)
+            population = population_part(campaigns)
+        found = steps(range(given.first_robot, given.first_robot + given.robots))
         draw_steps(found, given.out)
-        draw_population(campaigns["MBBR"], given.out)
-        draw_survival(campaigns, given.out)
+        page.write_text(population + steps_part(found, given.first_robot), encoding="utf-8")
     except (UserError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print("\n".join(steps_table(found)))
-    for rows in campaigns.values():
-        print("\n".join(["", *survival_table(rows), "", *error_table(rows)]))
+    print(page)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""docs/reliability.md: what was promised about faults, deadlines and data, and what was measured."""
+"""docs/reports/reliability.md: what was promised about faults, deadlines and data, and what was measured."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .entry import leave
 from .reliability_part import BINARY, BUILD, CONFIGS, ROOT, Part, isolated, output
 from .reliability_population import population
 
-PAGE = ROOT / "docs" / "reliability.md"
+PAGE = ROOT / "docs" / "reports" / "reliability.md"
 GUARD_LIMIT_MS = 15.0
 WAKE_RATIO_LIMIT = 1.1
 FUZZ_EXECUTIONS = 10_000_000
@@ -330,7 +330,7 @@ this code the tests notice: [mutation testing](mutation.md).
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="tools/reliability", description="Writes docs/reliability.md.")
+    parser = argparse.ArgumentParser(prog="tools/reliability", description="Writes docs/reports/reliability.md.")
     parser.add_argument(
         "parts", nargs="*", metavar="PART", help=f"only these: {', '.join(PARTS)}; prints them"
     )

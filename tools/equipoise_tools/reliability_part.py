@@ -1,4 +1,4 @@
-"""What every part of docs/reliability.md needs: rows, and how its commands are run."""
+"""What every part of docs/reports/reliability.md needs: rows, and how its commands are run."""
 
 from __future__ import annotations
 

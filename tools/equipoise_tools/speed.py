@@ -26,7 +26,7 @@ from .count_page import ROBOTS
 from .entry import leave
 from .paths import UserError, repository_root
 
-PAGE = Path("docs/speed.md")
+PAGE = Path("docs/reports/speed.md")
 SHORTEST_S, SHORT_S, LONG_S = 0.1, 20, 220
 ENDLESS_S, WARM_S = 36000, 1.0  # of simulation; of running
 TICKS = (2000, 22000)
@@ -283,7 +283,7 @@ def page(result: dict) -> str:
         f"Written by `./tools/speed --write`. CPU time of one core but where said; median of "
         f"{result['rounds']} interleaved rounds, least and most. Load of the machine at the end: "
         f"{result['load']:.1f} on {result['cores_of_the_machine']} cores. Counts that do not depend on it: "
-        "[performance.md](performance.md).",
+        "[performance.md](../performance.md).",
         "",
         "| | median | least | most | |",
         "|---|---|---|---|---|",

@@ -1,4 +1,4 @@
-// `equipoise campaign`: every fault in every phase of a run, and the soak; docs/reliability.md from it.
+// `equipoise campaign`: every fault in every phase of a run, and the soak; docs/reports/reliability.md from it.
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
@@ -283,7 +283,7 @@ void add_campaign(Subcommand app) {
   command.option("--soak-hours", a->soak_h, "then random runs, hours of robot time")
       .show_default()
       .range(0.0, 10000.0);
-  command.option("--markdown", a->markdown, "table for docs/reliability.md").file();
+  command.option("--markdown", a->markdown, "table for docs/reports/reliability.md").file();
   command.option("--json", a->json, "cases as JSON, - for stdout").file();
   command.action([=] { return campaign(*a); });
 }

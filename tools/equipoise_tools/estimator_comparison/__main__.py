@@ -1,7 +1,7 @@
 """The MBBR's default filter beside an unscented and an error-state filter of its model, on the same samples.
 
 python -m equipoise_tools.estimator_comparison              the page's tables and figure, anew: 10 minutes
-python -m equipoise_tools.estimator_comparison --from-data  from docs/estimators.csv
+python -m equipoise_tools.estimator_comparison --from-data  from docs/reports/estimators.csv
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--from-data", action="store_true", help="no flights: tables and figure from the CSV")
     parser.add_argument(
-        "--out", type=Path, default=repository_root() / "docs", help="estimators.md, .csv, images/"
+        "--out", type=Path, default=repository_root() / "docs" / "reports", help="estimators.md, .csv, .png"
     )
     options = parser.parse_args(arguments)
     if options.robots < 2 or options.duration < 8.0:
@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
         rows = measure.read(table)
     except OSError as error:
         raise UserError(f"{table}: {error.strerror}; run without --from-data") from None
-    page.draw(rows, options.out / "images")
+    page.draw(rows, options.out)
     text = page.tables(rows)
     print(text)
     page.insert(options.out / "estimators.md", text)

@@ -1,4 +1,4 @@
-"""Tables and figure of docs/estimators.md."""
+"""Tables and figure of docs/reports/estimators.md."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from .house import house
 from .law import law
 from .tidy import clang_tidy
 from .tree import tree_of_git
+from .words import words
 
 CHECKS = {
     "clang-format": formatting.clang_format,
@@ -20,6 +21,7 @@ CHECKS = {
     "shellcheck": formatting.shellcheck,
     "law": law,
     "house": house,
+    "words": words,
     "gcc-analyzer": analyzers.gcc_analyzer,
     "cppcheck": analyzers.cppcheck,
     "clang-tidy": clang_tidy,

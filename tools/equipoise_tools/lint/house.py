@@ -18,7 +18,7 @@ FORBIDDEN = (
 )
 LONGEST_OPENING_COMMENT = 8
 LONGEST_FILE = 400
-_BINARY = (".png", ".svg", ".lcm", ".log", ".bin", ".gz", ".ico", ".csv", ".parquet")
+_BINARY = (".png", ".gif", ".svg", ".lcm", ".log", ".bin", ".gz", ".ico", ".csv", ".parquet")
 
 
 def forbidden_words(tree: Tree) -> list[Finding]:

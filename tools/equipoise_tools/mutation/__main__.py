@@ -1,4 +1,4 @@
-"""`tools/mutation`: draws mutants, judges them, keeps the outcomes, writes docs/mutation.md."""
+"""`tools/mutation`: draws mutants, judges them, keeps the outcomes, writes docs/reports/mutation.md."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def main() -> int:
         prog="tools/mutation",
         description="Changes the firmware by one token at a time and looks which changes its tests notice. "
         "Outcomes are kept in build/mutation: started again it goes on where it was interrupted. Writes "
-        "docs/mutation.md when no room is named. Exit status: 1 when a survivor has no reason in "
+        "docs/reports/mutation.md when no room is named. Exit status: 1 when a survivor has no reason in "
         "tests/mutation/reasons.toml.",
     )
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)} (default: all)")
@@ -202,7 +202,7 @@ def main() -> int:
                 for key, each in learnt.items()
             }
     why = reasons(root)
-    page = root / "docs" / "mutation.md"
+    page = root / "docs" / "reports" / "mutation.md"
     to_page = options.page or not options.rooms
     earlier = page.read_text() if to_page and options.rooms else ""
     text, unexplained = write_page(measured, why, options.seed, root, before, earlier)

@@ -1,4 +1,4 @@
-"""docs/mutation.md: how many mutants each room's tests noticed, and why the others live."""
+"""docs/reports/mutation.md: how many mutants each room's tests noticed, and why the others live."""
 
 from __future__ import annotations
 
