@@ -330,7 +330,8 @@ this code the tests notice: [mutation testing](mutation.md).
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="tools/reliability", description="Writes docs/reports/reliability.md.")
+    told = "Writes docs/reports/reliability.md."
+    parser = argparse.ArgumentParser(prog="tools/reliability", description=told)
     parser.add_argument(
         "parts", nargs="*", metavar="PART", help=f"only these: {', '.join(PARTS)}; prints them"
     )

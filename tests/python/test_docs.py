@@ -1,0 +1,223 @@
+"""What hand-written pages name exists: options, keys, files, lines, tests; what they quote is there."""
+
+import re
+import shlex
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import pytest
+from equipoise_tools import parameters
+from equipoise_tools.lint.tree import tree_of_git
+from equipoise_tools.lint.words import pages, words
+
+# Inline code that looks like a path of the repository.
+_PATH = re.compile(r"(?:config|docs|drivers|examples|include|lcm|packaging|python|src|tests|tools)/[\w./-]+")
+_KEY_TABLES = "attitude|calibration|chain|controller|estimator|friction|motor|reference|robot|safety|world"
+_KEY = re.compile(rf"(?:{_KEY_TABLES})\.[a-z_][\w.\[\]*]*")
+_TEST = re.compile(r"test_\w+\.py::test_\w+")
+_LINE = re.compile(r"([\w./-]+\.(?:py|cpp|hpp|h|c|toml|md)):(\d+)")
+_NUMBER_LINK = re.compile(
+    r"\[([^\]]*\d[^\]]*)\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)"
+)
+MADE_BY_BUILD = ("build/", "logs/")
+OF_DEBIAN = ("/", "~")
+
+
+@cache
+def help_of(command: tuple[str, ...]) -> str | None:
+    """None: there is no such command."""
+    if not Path(command[0]).is_file():
+        return None
+    ended = subprocess.run([*command, "--help"], capture_output=True, text=True, timeout=120, check=False)
+    ours = len(command) == 1 or re.search(rf"^Usage: \S+ {command[1]}\b", ended.stdout, re.M)
+    return ended.stdout if ended.returncode == 0 and ours else None
+
+
+def code_of(text: str) -> list[tuple[int, str]]:
+    """(line, code) of every inline code and line of a shell block."""
+    found, shell = [], False
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith("```"):
+            shell = bool(re.match(r"```(sh|bash)\b", line))
+        elif shell:
+            found.append((number, re.sub(r"\s+#.*", "", line)))
+        else:
+            found += [(number, code) for code in re.findall(r"`([^`\n]+)`", line)]
+    return found
+
+
+def commands_of(code: str) -> list[list[str]]:
+    """The words of each of our commands in a line of shell or an inline code."""
+    found = []
+    for part in re.split(r"\s*(?:&&|\||;)\s*", code):
+        try:
+            said = shlex.split(part.rstrip("\\& "))
+        except ValueError:
+            continue
+        while said and (said[0] == "sudo" or "=" in said[0].split("/")[0]):
+            said = said[1:]
+        if said and (
+            said[0] in ("equipoise", "build/host/equipoise") or re.match(r"(\./)?tools/[a-z_-]+$", said[0])
+        ):
+            found.append(said)
+    return found
+
+
+def wrong_options(root: Path, said: list[str]) -> list[str]:
+    if said[0].endswith("equipoise"):
+        if len(said) < 2 or not re.fullmatch(r"[a-z-]+", said[1]) or said[1].startswith("-"):
+            return []
+        command = (str(root / "build/host/equipoise"), said[1])
+        rest = said[2:]
+    else:
+        command, rest = (str(root / said[0]),), said[1:]
+    if Path(command[0]).is_dir():
+        return []
+    text = help_of(command)
+    if text is None:
+        return [f"no command {' '.join(said[:2])}"]
+    if "--" in rest:
+        rest = rest[: rest.index("--")]  # options of the program behind
+    given = [word.split("=")[0] for word in rest if re.match(r"--[a-z]", word)]
+    if said[0].endswith("tools/run"):
+        text += help_of((str(root / "build/host/equipoise"), "sim")) or ""
+    return [
+        f"{' '.join(said[:2])} has no {option}"
+        for option in given
+        if not re.search(rf"(?<![\w-]){option}(?![\w-])", text)
+    ]
+
+
+@cache
+def keys() -> frozenset[str]:
+    found: set[str] = set()
+    for robot in parameters.CONFIGURATIONS:
+        found |= set(parameters.keys_of(robot))
+    tables = {key.rpartition(".")[0] for key in found}
+    return frozenset(found | tables | set(parameters.meanings()))
+
+
+def wrong_keys(code: str) -> list[str]:
+    found = []
+    for key in _KEY.findall(
+        re.sub(r"\S*/\S*|[\w-]+\.(?:toml|md|py|hpp|cpp|h|lcm|csv|dbc|json|key)\b", " ", code)
+    ):
+        name = parameters.name_of(key.rstrip(".]") if "[" not in key else key).removesuffix("[]")
+        if name not in keys() and not any(known.startswith(name + ".") for known in keys()):
+            found.append(f"no configuration key {key}")
+    return found
+
+
+def wrong_paths(root: Path, page: Path, code: str) -> list[str]:
+    found = []
+    for path in _PATH.findall(code if not code.startswith((*OF_DEBIAN, *MADE_BY_BUILD)) else ""):
+        before = code[: code.index(path)]
+        if (
+            (before.endswith(("/", "~", ".", "-", "_")) and not before.endswith(("./", " ./")))
+            or "*" in code
+            or re.search(r"NAME|ROBOT|--out ", code)
+        ):
+            continue
+        path = path.rstrip(".")
+        if not any(
+            (base / path).exists()
+            for base in (root, page.parent, root / "config", root / "src", root / "include/equipoise")
+        ):
+            found.append(f"no file {path}")
+    return found
+
+
+def wrong_lines(root: Path, text: str) -> list[str]:
+    found = []
+    for path, line in _LINE.findall(text):
+        file = root / path
+        if not file.is_file() or len(file.read_text(errors="replace").splitlines()) < int(line):
+            found.append(f"no line {path}:{line}")
+    return found
+
+
+def wrong_tests(root: Path, text: str) -> list[str]:
+    found = []
+    for name in _TEST.findall(text):
+        file, _, test = name.partition("::")
+        path = root / "tests/python" / file
+        if not path.is_file() or f"def {test}(" not in path.read_text():
+            found.append(f"no test {name}")
+    return found
+
+
+def wrong_quotes(page: Path, text: str) -> list[str]:
+    """A link to a report whose words have numbers: each must be in that report."""
+    found = []
+    for said, link in _NUMBER_LINK.findall(text):
+        report = (page.parent / link).resolve()
+        told = report.read_text() if report.is_file() else ""
+        for number in re.findall(r"\d+(?:\.\d+)?", said):
+            if not re.search(rf"(?<![\d.]){re.escape(number)}(?![\d]|\.\d)", told):
+                found.append(f"{link} does not say {number}")
+    return found
+
+
+def complaints(root: Path, page: Path) -> list[str]:
+    text = page.read_text(encoding="utf-8")
+    found = []
+    for number, code in code_of(text):
+        wrong = wrong_keys(code) + wrong_paths(root, page, code)
+        for said in commands_of(code):
+            wrong += wrong_options(root, said)
+        found += [f"{page.name}:{number}: {what}" for what in wrong]
+    whole = wrong_lines(root, text) + wrong_tests(root, text) + wrong_quotes(page, text)
+    return found + [f"{page.name}: {what}" for what in whole]
+
+
+def test_what_pages_name_exists(root):
+    found = []
+    for name in pages(tree_of_git(root)):
+        if name != "CHANGELOG.md":
+            found += complaints(root, root / name)
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("`equipoise sim --yaw-rate 3`", "has no --yaw-rate"),
+        ("```sh\n./tools/campaign --robot-count 3\n```", "has no --robot-count"),
+        ("`equipoise simulate --log x`", "no command equipoise simulate"),
+        ("set `safety.max_lean_rad` lower", "no configuration key safety.max_lean_rad"),
+        ("see `config/robot.toml`", "no file config/robot.toml"),
+        ("at src/app/main.cpp:99999", "no line src/app/main.cpp:99999"),
+        ("`test_links.py::test_that_is_not_there`", "no test test_links.py::test_that_is_not_there"),
+        ("[0.00777 rad](reports/as-built.md)", "does not say 0.00777"),
+        (
+            "`equipoise sim --yaw-hz 3`, `safety.max_tilt_rad`, `config/mbbr.toml`, CMakeLists.txt:1\n"
+            "[0.0076 rad](reports/as-built.md) `test_links.py::test_every_link_leads_somewhere`",
+            None,
+        ),
+    ],
+)
+def test_a_wrong_name_is_found(root, tmp_path, line, complaint):
+    (tmp_path / "reports").symlink_to(root / "docs/reports")
+    page = tmp_path / "page.md"
+    page.write_text(f"# Page\n{line}\n")
+    found = complaints(root, page)
+    assert (len(found) == 1 and complaint in found[0]) if complaint else found == []
+
+
+def test_pages_use_the_words_of_the_glossary(root):
+    assert [str(finding) for finding in words(tree_of_git(root))] == []
+
+
+def test_an_old_word_is_found(tmp_path):
+    from equipoise_tools.lint.tree import Tree
+
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/page.md").write_text("# A page\nThe gyro lies.\nA tilt, `as printed` in code, a run.\n")
+    found = words(Tree(tmp_path, ["docs/page.md"]))
+    assert [(f.line, "faulty" in str(f)) for f in found] == [(2, True)]
+
+
+def test_hand_written_pages_are_at_most_thirty_thousand_words(root):
+    names = [name for name in pages(tree_of_git(root)) if name != "docs/performance.md"]  # generated
+    assert sum(len((root / name).read_text(encoding="utf-8").split()) for name in names) <= 30000
