@@ -64,7 +64,7 @@ def lines(log: Log, summary: dict) -> dict:
     return found
 
 
-def times_better(_: Log, summary: dict) -> dict:
+def times_better(_: Log | None, summary: dict) -> dict:
     """Of our filter, in control, than the printed one on the same samples."""
     printed = summary["estimators"]["ekf13_published"]
     return {
@@ -115,6 +115,7 @@ def cases(seeds_each: int = 20) -> list[Case]:
                 fitted=FITTED,
                 seeds=seeds,
                 measure=times_better,
+                logged=False,
             )
         )
         found.append(
