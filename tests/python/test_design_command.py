@@ -114,7 +114,7 @@ def test_gains_poles_and_margins_are_printed(root):
         "3",
     ]
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    for word in ("K  ", "poles", "gain, dB", "phase, deg", "further delay"):
+    for word in ("K  ", "poles", "gain, dB", "phase, deg", "delay margin"):
         assert word in text
     row = design(root, "mbbr", "--last-hz", "0")["rows"][0]
     assert f"{row['lqr']['K'][0][0]:.5g}" in text

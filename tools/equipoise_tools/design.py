@@ -67,7 +67,7 @@ def draw_margins(axes: list[plt.Axes], rows: list[dict]) -> None:
         axes[2].plot(hz, [margin(r, place, "delay_ms") for r in rows], "o-", color=color)
     axes[1].axhline(WANTED["gain_dB"], color="0.4", lw=0.8, ls=":")
     axes[2].axhline(WANTED["delay_ms"], color="0.4", lw=0.8, ls=":")
-    labels = ("phase margin, degrees", "gain margins, dB", "further delay, ms")
+    labels = ("phase margin, degrees", "gain margins, dB", "delay margin, ms")
     for panel, label, top in zip(axes, labels, (90, 25, 40), strict=True):
         panel.set_ylim(0, top)
         panel.set_ylabel(label)

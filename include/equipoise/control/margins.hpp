@@ -17,7 +17,7 @@ struct Margins {
   double gain_up_dB = 0.0;
   double gain_down_dB = 0.0;  // negative: by how much the gain may fall
   double phase_deg = 0.0;     // smallest rotation, either way
-  double delay_s = 0.0;       // further delay
+  double delay_s = 0.0;       // delay margin
   double disk = 0.0;          // 2 / max |S - T|: gain and phase at once
 };
 /// 1 + L = 0 at the limit of stability. Infinite where nothing in range destabilises. The curve is not

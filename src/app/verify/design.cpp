@@ -42,7 +42,7 @@ void print(const nlohmann::json& d) {
   std::printf("%s, %s on %s\n", d["robot"].get<std::string>().c_str(),
               d["controller"].get<std::string>().c_str(), d["estimator"].get<std::string>().c_str());
   print_gains(d);
-  std::printf("yaw, Hz  broken at       gain, dB        phase, deg  further delay, ms  disk\n");
+  std::printf("yaw, Hz  broken at       gain, dB        phase, deg   delay margin, ms  disk\n");
   const auto value = [](const nlohmann::json& v) -> double {
     return v.is_null() ? std::numeric_limits<double>::infinity() : v.get<double>();
   };

@@ -75,13 +75,13 @@ def report(data: Data, out_dir: Path) -> Result:
     )
     for world in WORLDS:
         braking = f"{world}, {BRAKE}"
-        result.add("Fig. 4.6", "lean variance, brake", braking, "lean_variance_mrad2", unit="mrad²")
+        result.add("Fig. 4.6", "tilt variance, brake", braking, "lean_variance_mrad2", unit="mrad²")
         over = (braking, "lean_variance_mrad2", "ekf")
         for mode in MODES:
             for pwm_hz in PWM_HZ:
                 case = case_name(world, mode, pwm_hz)
                 what = f"{mode}, {pwm_hz} Hz"
-                result.add("Fig. 4.6", f"lean variance, {what}", case, "lean_variance_mrad2", unit="mrad²")
+                result.add("Fig. 4.6", f"tilt variance, {what}", case, "lean_variance_mrad2", unit="mrad²")
                 if mode == "coast":
                     result.add("Fig. 4.6", f"share of runs upright to the end, {what}", case, "held")
         for pwm_hz in PWM_HZ:
@@ -131,6 +131,6 @@ def draw(out_dir: Path, data: Data) -> None:
             axes.set(
                 xscale="log", yscale="log", xlabel="PWM frequency, Hz", title=f"{world} world (x: all fall)"
             )
-        panels[0].set_ylabel("variance of the lean, mrad²")
+        panels[0].set_ylabel("variance of the tilt, mrad²")
         style.legend_above(figure, panels[0])
         style.save(figure, out_dir / "bridge_modes")

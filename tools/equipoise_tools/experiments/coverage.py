@@ -1,37 +1,31 @@
 """Tables and figures of [T] in its order: what each is, and what a reader must know about its status."""
 
-INTRODUCTION = [
-    "# Experiments",
-    "",
-    "[T] is E. Sihite's dissertation (UC San Diego, 2019): two balancing robots, their models, filters "
-    "and controllers.",
-    "We have no robot and no motion capture. Every number here comes from our simulator, in which the "
-    "real firmware runs.",
-    "A simulation can show that a printed equation is wrong, or that a claim holds in a stated world; it "
-    "cannot repeat",
-    "a measurement. So each row says what ran: which filter, controller, gains and world, printed or ours.",
-    "Worlds: `thesis` is [T]'s own simulation; `nominal` an ideal build; `full` a typical built robot "
-    "([docs/disturbances.md](../disturbances.md)).",
-    "Numbers are medians over 20 seeds with their 5 to 95 % range, 60 s a run unless said; errors count "
-    "after 5 s.",
-    "The status follows from the findings on the experiment's page, by rule; "
-    "`tests/python/test_experiments.py` recomputes",
-    "both from the data. `./tools/experiments all` runs everything (half an hour on two cores); "
-    "`./tools/experiments --from-data all`",
-    "writes the same pages, byte for byte, from `data/*.parquet`. [errata.md](../errata.md) lists what "
-    "is wrong in [T].",
-]
+INTRODUCTION = """# Experiments
+
+[T] is E. Sihite's [dissertation](https://escholarship.org/uc/item/2cd979dq) (UC San Diego, 2019): two
+balancing robots, their models, filters and controllers. No robot and no motion capture was available: every
+number here comes from the simulator, in which the real firmware runs. A simulation can show that a
+published equation is wrong, or that a claim holds in a stated world; it cannot repeat a measurement. Each
+row says what ran: filter, controller, gains and world, published or ours. Published numbers come from
+[config/published.toml](../../config/published.toml), each experiment with the noise of its own section;
+`tests/python/test_published.py` compares them field by field. Worlds: `thesis` is [T]'s own simulation;
+`nominal` is as modelled, with sensor noise; `full` a typical built robot
+([disturbances](../disturbances.md)). Numbers are medians over 20 seeds with their 5 to 95 % range, 60 s a
+run unless stated; errors count after 5 s. The status follows from the findings on the experiment's page, by
+rule; `tests/python/test_experiments.py` recomputes both from the data. `./tools/experiments all` runs
+everything (half an hour on two cores); `./tools/experiments --from-data all` writes the same pages, byte
+for byte, from `data/*.parquet`. What is wrong in [T]: [errata.md](../errata.md).""".splitlines()
 
 IN_PLACE_HZ = ("0", "-1.5", "-1", "-0.75", "-0.5", "0.5", "0.75", "1", "1.5")  # Fig. 6.15 to 6.23
 
 # Target: (what it is, what a reader must know besides the findings).
 TARGETS = {
-    "(2.1), Fig. 2.5": ("wobble of a double-row wheel", "[T] prints no number"),
+    "(2.1), Fig. 2.5": ("wobble of a double-row wheel", "[T] has no number"),
     "(2.2)": ("normal force over latitude", ""),
     "2.3.2": ("torque lost with untilted wheels", ""),
     "Table 2.1": ("orthogonal omniwheel orientations", "digits off by up to 0.04°"),
     "Fig. 2.10": ("motor and gearbox selection", "the identified motor's curve; nothing to spare"),
-    "2.3.3": ("numbers of the motor's region of operation", "600 rpm is 0.785 m/s; 30° of lean: 0.086 N m"),
+    "2.3.3": ("numbers of the motor's region of operation", "600 rpm is 0.785 m/s; 30° of tilt: 0.086 N m"),
     "Table 3.3, DMP": ("MIP attitude: the packets of the IMU", "their noise is put in"),
     "Table 3.3, planar EKF": ("MIP attitude: planar EKF", "our balance loop; (3.50), (3.51) are unstable"),
     "Table 3.3, high yaw-rate EKF": ("MIP attitude: [T]'s own EKF", "ours stands beside it on the page"),
@@ -68,10 +62,6 @@ TARGETS = {
     "Table 6.1, fit": ("estimation errors, the fitted runs", "14 settings for 14 numbers, seed 1, 15 s"),
     "Table 6.1, prediction": ("estimation errors, other seeds, 60 s", "what the fit carries over"),
     "Table 6.1, growth with the yaw rate": ("errors grow with the yaw rate", "it is the heading's drift"),
-    "Table 6.1, our filter beside it": (
-        "our filter in control, the printed one on the same samples",
-        "ours; nothing of [T]'s is claimed",
-    ),
     "Table 6.2": ("gains for spinning in place", "nominal world beside it"),
     "Fig. 6.14": ("attitude errors of KF, EKF and DMP over yaw rate", "the DMP's noise is put in"),
     "Fig. 6.14, KF and EKF equal in ball speed": ("the remark that led to DMP+KF", ""),

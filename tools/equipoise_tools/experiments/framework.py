@@ -83,7 +83,7 @@ class Finding:
     target: str
     text: str
     claim: str  # "[T]": its statement; "ours": beside it, gives no status
-    derived: bool  # follows from what [T] prints, so that it can be refuted here
+    derived: bool  # follows from what [T] publishes, so that it can be refuted here
     ran: Ran
     case: str
     quantity: str

@@ -165,7 +165,7 @@ def report(data: Data, out_dir: Path) -> Result:
     result.add("Fig. 6.3", "lowest speed after a step of +20 cm/s", "speed step", quantity, unit="cm/s")
     text = "the ball first moves against the command"
     result.check("Fig. 6.3", text, "speed step", quantity, at_most=-0.1)
-    text = "the body leans into the travel"
+    text = "the body tilts into the travel"
     result.check("Fig. 6.3", text, "speed step", "largest_lean_in_a_second_rad", at_least=0.001)
     with plt.rc_context(style.RC):
         figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")

@@ -93,8 +93,7 @@ class Case:
     section: str = ""  # equation of the published EKF's process noise; needed where that filter runs
     gains: str = ""  # of [T], where not the configuration's
     fitted: str = ""
-    measure: Callable[[Log | None, dict], dict] | None = None
-    logged: bool = True  # measure reads the log; else it gets none
+    measure: Callable[[Log, dict], dict] | None = None
     trace: Callable[[Log], dict] | None = None  # of the first seed: series -> (t_s, values)
     trace_s: tuple[float, float] = (0.0, 30.0)
     seeds: tuple[int, ...] | None = None
@@ -145,7 +144,7 @@ def rows_of(case: Case, seed: int, traced: bool) -> Data:
     published_runs = options.get("estimator") == "ekf13_published" or options.get("compare")
     if published_runs and case.config == MBBR and not case.section:
         raise UserError(f"{case.name}: which equation's noise does the published EKF run with?")
-    if (case.measure is not None and case.logged) or (traced and case.trace is not None):
+    if case.measure is not None or (traced and case.trace is not None):
         summary, log = simulate(case.config, case.settings, **options)
     else:
         summary = summarise(case.config, case.settings, **options)

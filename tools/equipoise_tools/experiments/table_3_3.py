@@ -33,7 +33,7 @@ def case_name(world: str, yaw_rate: float) -> str:
 
 
 def predicted_y(log) -> np.ndarray:
-    """Accelerometer y as (3.47) predicts it from the printed filter's estimate."""
+    """Accelerometer y as (3.47) predicts it from the published filter's estimate."""
     state = log[names.STATE + "_EKF_PUBLISHED"]
     u_x = np.concatenate([[0.0], log[names.MOTORS]["u_lin"][:-1, 0]])[: state.size]
     theta, phi_dot = state["theta_rad"][:, 0], state["phi_dot_rad_s"][:, 0]
@@ -102,9 +102,9 @@ def report(data: Data, out_dir: Path) -> Result:
         "view: the packets' noise (0.010 rad: the DMP's row) and the IMU's place, 16 mm behind the "
         "centre of mass, "
         "which is atan(0.016 w²/g) = 0.16 rad at 10 rad/s: the complementary filters' last column.",
-        differs="the disturbances are modelled, and [T] does not print where its IMU sits. Our EKF "
+        differs="the disturbances are modelled, and [T] does not say where its IMU sits. Our EKF "
         "estimates the "
-        "IMU's mount and lever arm; the printed one takes the IMU for being at the centre of mass.",
+        "IMU's mount and lever arm; the published one takes the IMU for being at the centre of mass.",
         data=data,
     )
     for name, (target, label, printed) in ROWS.items():

@@ -19,7 +19,6 @@ from .runs import NO_GATES, Case, Lab
 
 COVERS = (
     "Table 6.1, fit", "Table 6.1, prediction", "Table 6.1, growth with the yaw rate",
-    "Table 6.1, our filter beside it",
     *(f"Fig. 6.{n}" for n in range(9, 14)),
 )  # fmt: skip
 FIGURES = {
@@ -29,7 +28,6 @@ FIGURES = {
     (1.0, 0.05): "Fig. 6.12",
 }
 WITHIN = 0.30
-TIMES_BETTER = 5.0
 DURATION_S = 60.0
 FITTED = "14 disturbances, to these 14 numbers"
 SECTION = "(6.28)"
@@ -64,16 +62,6 @@ def lines(log: Log, summary: dict) -> dict:
     return found
 
 
-def times_better(_: Log | None, summary: dict) -> dict:
-    """Of our filter, in control, than the printed one on the same samples."""
-    printed = summary["estimators"]["ekf13_published"]
-    return {
-        ("", f"{quantity}, printed over ours"): printed[quantity] / summary[quantity]
-        for quantity in ("attitude_rmse_rad", "ball_speed_rmse_m_s")
-        if summary["ended"] == "finished"
-    }
-
-
 def trace(log: Log) -> dict:
     found = timeplot.series_of(log, timeplot.channels("published EKF"), position=False)
     for name, channel in (("truth", names.TRUTH), ("published EKF", names.STATE)):
@@ -92,10 +80,6 @@ def predicted_case(row: tuple) -> str:
     return f"prediction: {label(row)}"
 
 
-def our_case(row: tuple) -> str:
-    return f"our filter: {label(row)}"
-
-
 def cases(seeds_each: int = 20) -> list[Case]:
     world = {"include": '["fragments/table_6_1.toml"]'}
     sets = {**world, **NO_GATES}
@@ -105,19 +89,6 @@ def cases(seeds_each: int = 20) -> list[Case]:
         found.append(Case(fit_case(row), sets=sets, section=SECTION, options=fit, fitted=FITTED, seeds=(1,)))
         longer = {**fit, "duration_s": DURATION_S}
         seeds = tuple(range(2, seeds_each + 2))
-        ours = {**longer, "estimator": "ekf", "compare": True}
-        found.append(
-            Case(
-                our_case(row),
-                sets=world,
-                section=SECTION,
-                options=ours,
-                fitted=FITTED,
-                seeds=seeds,
-                measure=times_better,
-                logged=False,
-            )
-        )
         found.append(
             Case(
                 predicted_case(row), sets=sets, section=SECTION, options=longer, fitted=FITTED, seeds=seeds,
@@ -167,18 +138,6 @@ def report(data: Data, out_dir: Path) -> Result:
                 near = ((1 - WITHIN) * printed, (1 + WITHIN) * printed)
                 words = f"{text} within 30 % of {scale * printed:g} {unit}"
                 result.check(target, words, case, quantity, between=near)
-        target, case = "Table 6.1, our filter beside it", our_case(row)
-        text = f"{label(row)}: upright to the end, every run"
-        result.check(target, text, case, "held", at_least=1.0, statistic="share", claim="ours")
-        for what, quantity, scale, unit in (
-            ("attitude RMSE", "attitude_rmse_rad", 1, "rad"),
-            ("ball speed RMSE, inertial frame", "ball_speed_rmse_m_s", 100, "cm/s"),
-        ):
-            result.add(target, f"{label(row)}: {what}, ours", case, quantity, "ekf", unit=unit, scale=scale)
-            ratio = f"{quantity}, printed over ours"
-            result.add(target, f"{label(row)}: {what}, printed filter over ours", case, ratio)
-            text = f"{label(row)}: {what}, printed filter over ours, every run {TIMES_BETTER:g} or more"
-            result.check(target, text, case, ratio, at_least=TIMES_BETTER, statistic="smallest", claim="ours")
         case = predicted_case(row)
         target = "Table 6.1, growth with the yaw rate"
         quantity = "yaw_frame_speed_rmse_m_s"
