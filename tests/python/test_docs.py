@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from equipoise_tools import parameters
 from equipoise_tools.lint.tree import tree_of_git
-from equipoise_tools.lint.words import pages, words
+from equipoise_tools.lint.words import TERMS, pages, words
 
 # Inline code that looks like a path of the repository.
 _PATH = re.compile(r"(?:config|docs|drivers|examples|include|lcm|packaging|python|src|tests|tools)/[\w./-]+")
@@ -103,6 +103,7 @@ def wrong_keys(code: str) -> list[str]:
     for key in _KEY.findall(
         re.sub(r"\S*/\S*|[\w-]+\.(?:toml|md|py|hpp|cpp|h|lcm|csv|dbc|json|key)\b", " ", code)
     ):
+        key = re.sub(r"^world\.\w+\]?$", "world.*", key)
         name = parameters.name_of(key.rstrip(".]") if "[" not in key else key).removesuffix("[]")
         if name not in keys() and not any(known.startswith(name + ".") for known in keys()):
             found.append(f"no configuration key {key}")
@@ -207,6 +208,29 @@ def test_a_wrong_name_is_found(root, tmp_path, line, complaint):
 
 def test_pages_use_the_words_of_the_glossary(root):
     assert [str(finding) for finding in words(tree_of_git(root))] == []
+
+
+def usages(root) -> dict[str, str]:
+    """Help of the commands, and the text that each script in tools/ prints for --help."""
+    man = [root / "build/host/equipoise", "man", "--to", "markdown"]
+    found = {"equipoise": subprocess.run(man, capture_output=True, text=True, check=True).stdout}
+    for script in (path for path in (root / "tools").iterdir() if path.is_file() and not path.suffix):
+        found[script.name] = "\n".join(
+            re.findall(r"<<'?TEXT'?\n(.*?)^TEXT$", script.read_text(), re.S | re.M)
+        )
+    return found
+
+
+def test_help_uses_the_words_of_the_glossary(root):
+    found = []
+    for name, text in usages(root).items():
+        for pattern, instead in TERMS:
+            found += [
+                f"{name}: {m[0]}; write: {instead}"
+                for m in pattern.finditer(text)
+                if m[0] not in ("mip", "Mip")
+            ]
+    assert found == []
 
 
 def test_an_old_word_is_found(tmp_path):

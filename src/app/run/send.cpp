@@ -49,7 +49,7 @@ void add_send(Subcommand app) {
   const Option sideways =
       command.option("--sideways-mps", a->sideways_mps, "to the left, m/s").range(-2.0, 2.0);
   const Option yaw = command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second").range(-5.0, 5.0);
-  const Option arm = command.flag("--arm,!--disarm", a->arm, "motors on, or off until somebody arms anew");
+  const Option arm = command.flag("--arm,!--disarm", a->arm, "motors on, or off until a sender arms again");
   command.flag("--heading-reset", a->heading_reset, "forward is where the robot points now");
   const Option duration = command.option("--duration-s", a->duration_s, "repeat the motion for this long, s")
                               .show_default()

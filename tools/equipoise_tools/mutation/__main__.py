@@ -124,11 +124,11 @@ def main() -> int:
         prog="tools/mutation",
         description="Changes the firmware by one token at a time and looks which changes its tests notice. "
         "Outcomes are kept in build/mutation: started again it goes on where it was interrupted. Writes "
-        "docs/reports/mutation.md when no room is named. Exit status: 1 when a survivor has no reason in "
+        "docs/reports/mutation.md when no part is named. Exit status: 1 when a survivor has no reason in "
         "tests/mutation/reasons.toml.",
     )
-    parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)} (default: all)")
-    parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants per room (default 40; 0: all)")
+    parser.add_argument("rooms", nargs="*", metavar="PART", help=f"of {', '.join(ROOMS)} (default: all)")
+    parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants per part (default 40; 0: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
     parser.add_argument(
         "--learnt",
@@ -140,10 +140,10 @@ def main() -> int:
         "judged, too, and counted apart",
     )
     parser.add_argument(
-        "--learnt-sample", type=int, default=SAMPLE, help="mutants per room of each of them (default 40)"
+        "--learnt-sample", type=int, default=SAMPLE, help="mutants per part of each of them (default 40)"
     )
     parser.add_argument(
-        "--fresh-only", action="store_true", help="leave the samples of --learnt out, but do not judge them"
+        "--fresh-only", action="store_true", help="exclude the samples of --learnt without judging them"
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time (default: the cores)")
     parser.add_argument("--list", action="store_true", help="print the sample and change nothing")
@@ -153,7 +153,7 @@ def main() -> int:
     parser.add_argument(
         "--page",
         action="store_true",
-        help="write the page also when rooms are named; the others keep their rows",
+        help="write the page also when parts are named; the others keep their rows",
     )
     options = parser.parse_args()
     unknown = [name for name in options.rooms if name not in ROOMS]

@@ -119,7 +119,7 @@ function showStatus() {
   show("link", !open ? "no connection" : run ? `${run.robot} · ${run.estimator} · ${run.controller}` : status.heard ? kind : "silent");
   const robotStatus = remote?.status, mine = Boolean(status.mine), over = mine && robotStatus && !robotStatus.mine;
   $("take").hidden = stats.hello && !stats.hello.can_command;
-  show("take", over ? `${robotStatus.holder || "somebody"} has taken over: take back` : mine ? "In control: release" : "Take control");
+  show("take", over ? `${robotStatus.holder || "another sender"} has taken over: resume control` : mine ? "In control: release" : "Take control");
   $("take").classList.toggle("on", mine && !over);
   $("take").dataset.next = mine && !over ? "release" : "take";
   const may = mine && robotStatus && !playback;
@@ -188,7 +188,7 @@ function showParameterNote() {
 // Playback.
 
 function showLogs(logs) {
-  $("logs").replaceChildren(new Option("play a log…", ""), ...logs.map((l) => new Option(`${l.name}  (${(l.bytes / 1e6).toFixed(1)} MB)`, l.name)));
+  $("logs").replaceChildren(new Option("replay a log…", ""), ...logs.map((l) => new Option(`${l.name}  (${(l.bytes / 1e6).toFixed(1)} MB)`, l.name)));
 }
 
 function showPlayback(described) {
@@ -311,7 +311,7 @@ $("heading").onclick = () => say({ do: "heading-reset" });
 $("restart").onclick = () => say({ do: "restart" });
 $("record").onclick = () => say({ do: "record", on: !status.recording });
 $("pause").onclick = () => plots.pause(!plots.paused);
-plots.onpause = (on) => { $("pause").textContent = on ? "Go on" : "Pause plots"; };
+plots.onpause = (on) => { $("pause").textContent = on ? "Resume plots" : "Pause plots"; };
 $("follow-camera").onchange = (event) => { scene.follow = event.target.checked; };
 $("filter").oninput = filterParameters;
 $("apply").onclick = () => say({ do: "set", changes: Object.fromEntries(changes) });
