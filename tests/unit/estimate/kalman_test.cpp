@@ -114,6 +114,7 @@ TEST(MbbrModels, AnalyticJacobiansAreTheDerivatives) {
   x8 << 0.05, -0.03, 1.0, -2.0, 0.3, 0.2, 4.0, -3.0;
   expect_jacobians_match<MbbrLinearModel, 8, 6>(MbbrLinearModel(MbbrParameters{}, true), x8,
                                                 Vec3(0.2, -0.1, 6.0), 1e-7);
+  expect_jacobians_match<MbbrLinearModel, 8, 6>(MbbrLinearModel::published(), x8, Vec3(0.2, -0.1, 6.0), 1e-7);
 }
 
 TEST(MbbrModels, CorrectedModelIsTheExactDynamicsForSmallTilt) {
