@@ -11,11 +11,11 @@ from .. import metrics, names, style
 from ..style import plt
 from .data import Data
 from .framework import Result
-from .runs import MIP, Case, Lab
+from .runs import BUILT, MIP, Case, Lab
 
 COVERS = ("Fig. 4.6", "Fig. 4.6, 1 kHz", "Fig. 4.6, uncompensated at 10 and 20 kHz")
 PWM_HZ = (500, 1000, 5000, 10000, 20000)
-WORLDS = ("full", "nominal")
+WORLDS = (BUILT, "nominal")
 MODES = {  # whether the firmware inverts the bridge's model
     "coast": {"motor.invert_bridge": "false"},
     "coast, compensated": {},
@@ -58,8 +58,8 @@ def measure(lab: Lab) -> Data:
 def report(data: Data, out_dir: Path) -> Result:
     result = Result(
         title="Attitude variance by bridge mode and PWM frequency (Fig. 4.6)",
-        command="equipoise sim --config config/edumip.toml --fidelity full --set "
-        "world.full.bridge=drive_coast "
+        command="equipoise sim --config config/edumip.toml --fidelity built2025 --set "
+        "world.built2025.bridge=drive_coast "
         "--set motor.pwm_hz=20000 [--set motor.invert_bridge=false]",
         method=f"The eduMIP holds its position for {DURATION_S:.0f} s; one controller, designed for "
         "drive/brake. "
@@ -70,7 +70,7 @@ def report(data: Data, out_dir: Path) -> Result:
         "inductance is "
         "an estimate. Its exception at 1 kHz, a limit cycle of its robot, does not appear here. Where "
         "friction and "
-        "play are large (full world) the compensated bridge is calmer than drive/brake, not equal to it.",
+        "play are large (built2025 world) the compensated bridge is calmer than drive/brake.",
         data=data,
     )
     for world in WORLDS:

@@ -12,14 +12,14 @@ from ..style import plt
 from . import timeplot
 from .data import Data
 from .framework import Result
-from .runs import AS_PUBLISHED, MBBR, NO_GATES, Case, Lab
+from .runs import AS_PUBLISHED, BUILT, MBBR, NO_GATES, Case, Lab
 
 CONDITIONS = ((0.5, 0.20), (0.75, 0.15), (1.0, 0.10), (1.5, 0.05))
 EKF_FIGURES = tuple(f"Fig. 6.{n}" for n in range(25, 29))
 KF_FIGURES = tuple(f"Fig. 6.{n}" for n in range(29, 33))
 COVERS = ("Fig. 6.6", "Table 6.3", *EKF_FIGURES, *KF_FIGURES, "6.4.6, DMP+KF outlasts the EKF")
 DURATION_S = 60.0
-WORLDS = ("full", "nominal")
+WORLDS = (BUILT, "nominal")
 TABLE_6_3 = published.gains("Table 6.3")
 RAN = {  # label: controller, filter, settings
     "all as published": ("thesis", "ekf13_published", {**AS_PUBLISHED, **TABLE_6_3}),
@@ -72,14 +72,14 @@ def cases() -> list[Case]:
     found = []
     for world in WORLDS:
         for label, (controller, filter_name, sets) in RAN.items():
-            if label in FULL_ONLY and world != "full":
+            if label in FULL_ONLY and world != BUILT:
                 continue
             for hz, drive in CONDITIONS:
                 options = {
                     "yaw_hz": hz, "drive_mps": drive, "controller": controller, "estimator": filter_name,
                     "duration_s": DURATION_S, "fidelity": world,
                 }  # fmt: skip
-                traced = trace if world == "full" and label in TRACED else None
+                traced = trace if world == BUILT and label in TRACED else None
                 name = case_name(world, label, (hz, drive))
                 settings = {**NO_GATES, **sets}
                 found.append(
@@ -118,9 +118,9 @@ def measure(lab: Lab) -> Data:
 def report(data: Data, out_dir: Path) -> Result:
     result = Result(
         title="Spinning and driving at once (Fig. 6.6, 6.25-6.32, Table 6.3)",
-        command="equipoise sim --config config/mbbr.toml --fidelity full --controller thesis "
+        command="equipoise sim --config config/mbbr.toml --fidelity built2025 --controller thesis "
         "--estimator ekf13_published --yaw-hz 1 --drive-mps 0.1 --duration-s 60",
-        method=f"Four conditions, {DURATION_S:.0f} s, the built robot (full world); the nominal world "
+        method=f"Four conditions, {DURATION_S:.0f} s, the built robot (built2025 world); the nominal world "
         "beside it. `as published`: filter with its section's noise, (6.13) with its sign, Euler-angle "
         "rates, filters in the yaw frame, no feed-forward, commands without an acceleration limit, all "
         "from config/published.toml. `published EKF` and `published DMP+KF`: the same, controller corrected "
@@ -138,7 +138,7 @@ def report(data: Data, out_dir: Path) -> Result:
         for label in RAN:
             for condition in CONDITIONS:
                 case = case_name(world, label, condition)
-                if label in FULL_ONLY and world != "full":
+                if label in FULL_ONLY and world != BUILT:
                     continue
                 target = OF_T.get(label, KF_FIGURES if "KF" in label else EKF_FIGURES)[
                     CONDITIONS.index(condition)
@@ -156,21 +156,21 @@ def report(data: Data, out_dir: Path) -> Result:
         for world in WORLDS:
             check_held(result, i, condition, world)
         for label, figures in TRACED.items():
-            check_tracking(result, figures[i], case_name("full", label, condition), said(condition))
+            check_tracking(result, figures[i], case_name(BUILT, label, condition), said(condition))
     last = CONDITIONS[-1]
     text = f"the EKF loses balance at {said(last)}, about 8 s in (6 to 12 s)"
     for label in ("all as published", "published EKF", "our EKF"):
         claim = "[T]" if label in OF_T else "ours"
-        case = case_name("full", label, last)
+        case = case_name(BUILT, label, last)
         result.check(EKF_FIGURES[-1], text, case, "upright_s", between=(6.0, 12.0), claim=claim)
     target = "6.4.6, DMP+KF outlasts the EKF"
     for label in ("DMP+KF as published", "published DMP+KF", "our DMP+KF"):
         claim = "[T]" if label in OF_T else "ours"
-        case = case_name("full", label, last)
+        case = case_name(BUILT, label, last)
         share = {"statistic": "share", "at_least": 1.0}
         result.check(target, f"DMP+KF holds {said(last)}, every run", case, "held", claim=claim, **share)
         text = f"DMP+KF stays up longer than the published EKF at {said(last)}, by half or more"
-        over = (case_name("full", "published EKF", last), "upright_s", "ekf13_published")
+        over = (case_name(BUILT, "published EKF", last), "upright_s", "ekf13_published")
         result.check(target, text, case, "upright_s", at_least=1.5, over=over, claim=claim)
     text = "the gains (6.22) hold 1 Hz and 20 cm/s for 20 s, every run"
     result.check("Fig. 6.6", text, "simulation (6.22)", "held", at_least=1.0, statistic="share", derived=True)
@@ -192,10 +192,8 @@ def report(data: Data, out_dir: Path) -> Result:
     for label, targets in TRACED.items():
         for target, condition in zip(targets, CONDITIONS, strict=True):
             name = target.lower().replace(". ", "_").replace(".", "_")
-            title = (
-                f"{target}: {said(condition)}, full world, {label}, Table 6.3, controller corrected; seed 1"
-            )
-            timeplot.draw(out_dir / name, data, case_name("full", label, condition), labels, title)
+            title = f"{target}: {said(condition)}, built2025 world, {label}, Table 6.3; seed 1"
+            timeplot.draw(out_dir / name, data, case_name(BUILT, label, condition), labels, title)
             result.pictures.append(name)
     return result
 
@@ -204,10 +202,10 @@ def check_held(result: Result, i: int, condition: tuple[float, float], world: st
     share = {"statistic": "share", "at_least": 1.0}
     words = said(condition)
     for label in RAN:
-        if label in FULL_ONLY and world != "full":
+        if label in FULL_ONLY and world != BUILT:
             continue
         case = case_name(world, label, condition)
-        claim = "[T]" if label in OF_T and world == "full" else "ours"
+        claim = "[T]" if label in OF_T and world == BUILT else "ours"
         falls = EKF_FIGURES[i] == "Fig. 6.28" and OF_T.get(label) == EKF_FIGURES  # there it falls in [T], too
         if label != "ours" and not falls:
             text = f"the gains of Table 6.3 hold {words}, {world} world, every run"
@@ -238,7 +236,7 @@ def draw(out_dir: Path, data: Data) -> None:
         figure, panels = plt.subplots(1, 2, figsize=(10, 3.8), sharey=True, layout="constrained")
         for axes, world in zip(panels, WORLDS, strict=True):
             for i, label in enumerate(RAN):
-                if label in FULL_ONLY and world != "full":
+                if label in FULL_ONLY and world != BUILT:
                     continue
                 shown = [
                     np.percentile(data.values(case_name(world, label, c), "upright_s"), (5, 50, 95))

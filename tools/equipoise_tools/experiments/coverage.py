@@ -9,7 +9,7 @@ published equation is wrong, or that a claim holds in a stated world; it cannot 
 row says what ran: filter, controller, gains and world, published or ours. Published numbers come from
 [config/published.toml](../../config/published.toml), each experiment with the noise of its own section;
 `tests/python/test_published.py` compares them field by field. Worlds: `thesis` is [T]'s own simulation;
-`nominal` is as modelled, with sensor noise; `full` a typical built robot
+`nominal` is as modelled, with sensor noise; `built2025` a typical built robot
 ([disturbances](../disturbances.md)). Numbers are medians over 20 seeds with their 5 to 95 % range, 60 s a
 run unless stated; errors count after 5 s. The status follows from the findings on the experiment's page, by
 rule; `tests/python/test_experiments.py` recomputes both from the data. `./tools/experiments all` runs

@@ -13,12 +13,12 @@ from ..style import plt
 from . import published_kf, timeplot
 from .data import Data
 from .framework import Result
-from .runs import NO_GATES, Case, Lab, equipoise_json
+from .runs import BUILT, NO_GATES, Case, Lab, equipoise_json
 
 YAW_HZ = (0.0, -1.5, -1.0, -0.75, -0.5, 0.5, 0.75, 1.0, 1.5)
 FIGURES = {hz: f"Fig. 6.{15 + i}" for i, hz in enumerate(YAW_HZ)}
 COVERS = ("Fig. 6.14", "Fig. 6.14, KF and EKF equal in ball speed", *FIGURES.values(), "Table 6.2")
-WORLD = "full"
+WORLD = BUILT
 DURATION_S = 60.0
 PUBLISHED_KF = "kf as published"
 COMPARED = ("ekf13_published", PUBLISHED_KF, "kf_attitude", "ekf13", "ekf")
@@ -123,7 +123,7 @@ def measure(lab: Lab) -> Data:
 def report(data: Data, out_dir: Path) -> Result:
     result = Result(
         title="Estimators while spinning in place (Fig. 6.14 to 6.23, Table 6.2)",
-        command="equipoise sim --config config/mbbr.toml --fidelity full --yaw-hz 1 --compare "
+        command="equipoise sim --config config/mbbr.toml --fidelity built2025 --yaw-hz 1 --compare "
         "--duration-s 60",
         method=f"Spin in place at nine yaw rates, {DURATION_S:.0f} s, {WORLD} world; our EKF and the "
         "scheduled gains "

@@ -11,13 +11,13 @@ from .. import metrics, names, published, style
 from ..style import plt
 from .data import TRACE_HZ, Data
 from .framework import Result
-from .runs import NO_GATES, Case, Lab, over_estimate
+from .runs import BUILT, NO_GATES, Case, Lab, over_estimate
 
 COVERS = ("Fig. 6.4", "Fig. 6.5", "Fig. 6.5, with compensation", "Fig. 6.8")
 PUBLISHED, CORRECTED = "ekf13_published", "ekf13"  # the same states; the model as published, and corrected
 CHANNEL = names.STATE + "_EKF13_PUBLISHED"
-WORLDS = {"Fig. 6.4": "thesis", "Fig. 6.5": "full"}
-SECTION = {"thesis": "(6.21)", "full": "(6.26)"}
+WORLDS = {"Fig. 6.4": "thesis", "Fig. 6.5": BUILT}
+SECTION = {"thesis": "(6.21)", BUILT: "(6.26)"}
 GAINS = (0.0, published.table()["6.2.2"]["compensation"])
 DURATION_S = 60.0
 MU_C_OVER_K1 = published.table()["6.2.2"]["mu_c_over_k1"]
@@ -84,10 +84,10 @@ def measure(lab: Lab) -> Data:
 def report(data: Data, out_dir: Path) -> Result:
     result = Result(
         title="Friction compensation (Fig. 6.4, 6.5, 6.8)",
-        command="equipoise sim --config config/mbbr.toml --fidelity full --compare --duration-s 60 "
+        command="equipoise sim --config config/mbbr.toml --fidelity built2025 --compare --duration-s 60 "
         "--set friction.compensation=0",
         method="The robot balances in place with and without Coulomb compensation; our EKF controls, the "
-        "published EKF, noise of (6.21) in the thesis world and of (6.26) in the full world, runs on "
+        "published EKF, noise of (6.21) in the thesis world and of (6.26) in the built2025 world, runs on "
         "the same samples. Over-estimate: slope of the estimated ball rate on the true one. Fig. 6.8: the "
         "accelerometer that (5.33) predicts from the published EKF, without and with Coulomb friction "
         "(0.30 sign) in the model; jump: its largest change in a tick. It is the friction term itself: "
@@ -114,10 +114,10 @@ def report(data: Data, out_dir: Path) -> Result:
         words = f"{text}, corrected model"
         result.check(figure, words, with_it, "over_estimate", CORRECTED, between=(0.75, 1.25),
                      claim="ours")  # fmt: skip
-        target = "Fig. 6.5, with compensation" if world == "full" else figure
-        claim = "[T]" if world == "full" else "ours"
+        target = "Fig. 6.5, with compensation" if world == BUILT else figure
+        claim = "[T]" if world == BUILT else "ours"
         result.check(target, text, with_it, "over_estimate", PUBLISHED, between=(0.75, 1.25), claim=claim)
-    case = case_name("full", GAINS[1])
+    case = case_name(BUILT, GAINS[1])
     for name in ("plain", "with_friction"):
         quantity = f"prediction_jump_{name}_m_s2"
         result.add(
@@ -154,7 +154,7 @@ def draw(out_dir: Path, data: Data) -> None:
         style.legend_above(figure, rows[0, 0])
         style.save(figure, out_dir / "friction_compensation")
         figure, rows = plt.subplots(2, 1, figsize=(9, 4.5), layout="constrained", sharex=True, sharey=True)
-        case = case_name("full", GAINS[1])
+        case = case_name(BUILT, GAINS[1])
         for axes, label in zip(rows, ("plain", "with friction"), strict=True):
             measured = data.trace(case, "measured")
             t_s = 10 + np.arange(measured.size) / TRACE_HZ

@@ -12,7 +12,7 @@ from .. import published, style
 from ..style import plt
 from .data import Data, Ran
 from .framework import Result
-from .runs import NO_GATES, Case, Lab, equipoise_json
+from .runs import BUILT, NO_GATES, Case, Lab, equipoise_json
 
 COVERS = (
     "(3.41), (3.42)", "(3.43), (3.47)", "4.4", "(5.28)", "(5.29)", "(5.31), (5.33)", "(5.32)",
@@ -28,7 +28,7 @@ SPINNING = {
     "estimator": "truth",
     "yaw_hz": 1.0,
     "duration_s": 60.0,
-    "fidelity": "full",
+    "fidelity": BUILT,
 }
 TABLE_6_3 = published.gains("Table 6.3")
 AS_FIG_6_2 = {**NO_GATES, **published.control(), **TABLE_6_3, "reference.slc_sign": 1.0}
@@ -180,7 +180,7 @@ def report(data: Data, out_dir: Path) -> Result:
         "(`equipoise model`), upright at rest; a coefficient holds within 2.5 %, the rounding of two digits. "
         "(5.32), (5.33): the term itself at 1 Hz and 20 cm/s. 4.4: Newton's method of (4.31)-(4.34) to 1e-3 "
         "of the duty over 37 speeds and 25 currents, T_r of (6.16). (6.10), Fig. 6.2: true states in the "
-        "full world, 1 Hz in place, (6.13)'s sign turned: Euler-angle rates, filters in the yaw frame, no "
+        "built2025 world, 1 Hz in place, (6.13)'s sign turned: Euler rates, filters in the yaw frame, no "
         "feed-forward, commands without limit.",
         differs="errata.md lists what is wrong and how it was found.",
         data=data,

@@ -20,6 +20,7 @@ from ..paths import UserError, repository_root
 from .data import Data, Ran, thinned
 
 MBBR, MIP = "config/mbbr.toml", "config/edumip.toml"
+BUILT = "built2025"  # the world of a typical built robot in which these were measured; `full` moves on
 # [T]'s robot had none of our gates: only the tilt ends a run (limits at the ends of their ranges).
 NO_GATES = {
     "safety.max_innovation_published": 1000,

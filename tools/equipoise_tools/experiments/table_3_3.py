@@ -11,7 +11,7 @@ from .. import names, style
 from ..style import plt
 from .data import TRACE_HZ, Data
 from .framework import Result
-from .runs import MIP, NO_GATES, Case, Lab
+from .runs import BUILT, MIP, NO_GATES, Case, Lab
 
 ROWS = {  # ours: target, [T]'s name, its printed RMSE at each yaw rate
     "attitude": ("Table 3.3, DMP", "DMP", (0.0148, 0.0115, 0.0129)),
@@ -22,7 +22,7 @@ ROWS = {  # ours: target, [T]'s name, its printed RMSE at each yaw rate
 }
 COVERS = (*dict.fromkeys(target for target, _, _ in ROWS.values()), "Fig. 3.4a", "Fig. 3.4b")
 YAW_RATES = (0, 5, 10)
-WORLDS = ("full", "nominal")
+WORLDS = (BUILT, "nominal")
 DURATION_S = 60.0
 WITHIN = 0.30
 LEVER = "IMU 16 mm behind the centre of mass, DMP's noise 0.010 rad"
@@ -67,7 +67,7 @@ def cases() -> list[Case]:
                 "fidelity": world,
             },
             fitted=LEVER,
-            trace=trace if world == "full" else None,
+            trace=trace if world == BUILT else None,
             trace_s=(5.0, 15.0),
         )
         for world in WORLDS
@@ -84,7 +84,7 @@ def measure(lab: Lab) -> Data:
 def add_offsets(data: Data) -> None:
     """Of the predicted accelerometer from the measured one, mean over the shown ten seconds."""
     for yaw_rate in YAW_RATES:
-        case = case_name("full", yaw_rate)
+        case = case_name(BUILT, yaw_rate)
         off = np.mean(data.trace(case, "y measured") - data.trace(case, "y predicted"))
         data.add(
             case, "y_offset_m_s2", abs(off), data.ran(case, "attitude_rmse_rad", "ekf_published"), 1, 60.0
@@ -94,8 +94,8 @@ def add_offsets(data: Data) -> None:
 def report(data: Data, out_dir: Path) -> Result:
     result = Result(
         title="eduMIP attitude at high yaw rates (Table 3.3, Fig. 3.4)",
-        command="equipoise sim --config config/edumip.toml --fidelity full --estimator attitude --compare "
-        "--yaw-rad-s 5 --duration-s 60",
+        command="equipoise sim --config config/edumip.toml --fidelity built2025 --estimator attitude "
+        "--compare --yaw-rad-s 5 --duration-s 60",
         method=f"{DURATION_S:.0f} s at 0, 5 and 10 rad/s; every estimator on the same samples, against the "
         "plant's truth after 5 s. As in [T] the attitude packets control, through our 200 Hz redesign of the "
         "balance loop ((3.50), (3.51) are unstable as published). Two numbers were put in with this table in "
@@ -113,7 +113,7 @@ def report(data: Data, out_dir: Path) -> Result:
                 case = case_name(world, yaw_rate)
                 what = f"{label}, {yaw_rate} rad/s"
                 result.add(target, what, case, "attitude_rmse_rad", name, value, "rad")
-                if world == "full":
+                if world == BUILT:
                     near = ((1 - WITHIN) * value, (1 + WITHIN) * value)
                     text = f"{what}: {value} rad within 30 %"
                     result.check(target, text, case, "attitude_rmse_rad", name, between=near)
@@ -122,7 +122,7 @@ def report(data: Data, out_dir: Path) -> Result:
             case = case_name(world, yaw_rate)
             what = f"our EKF in its place, {yaw_rate} rad/s"
             result.add("Table 3.3, high yaw-rate EKF", what, case, "attitude_rmse_rad", "ekf", None, "rad")
-    fast, still = case_name("full", 10), case_name("full", 0)
+    fast, still = case_name(BUILT, 10), case_name(BUILT, 0)
     for name in ("planar_kf", "complementary", "complementary_kf"):
         target, label, _ = ROWS[name]
         text = f"{label} errs at least four times as much at 10 rad/s as at rest"
@@ -138,7 +138,7 @@ def report(data: Data, out_dir: Path) -> Result:
         )
     for yaw_rate in YAW_RATES:
         text = f"balances {DURATION_S:.0f} s at {yaw_rate} rad/s in every run"
-        case = case_name("full", yaw_rate)
+        case = case_name(BUILT, yaw_rate)
         result.check("Fig. 3.4a", text, case, "held", "attitude", at_least=1.0, statistic="share")
     text = "at 10 rad/s the predicted accelerometer y is off by more than 0.5 m/s² (centripetal, lever arm)"
     result.check("Fig. 3.4b", text, fast, "y_offset_m_s2", "ekf_published", at_least=0.5)
@@ -162,7 +162,7 @@ def draw(data: Data, out_dir: Path) -> None:
         figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
         for i, name in enumerate(order):
             for j, yaw_rate in enumerate(YAW_RATES):
-                values = data.values(case_name("full", yaw_rate), "attitude_rmse_rad", name)
+                values = data.values(case_name(BUILT, yaw_rate), "attitude_rmse_rad", name)
                 low, middle, high = np.percentile(values, (5, 50, 95))
                 at = i + 0.25 * (j - 1)
                 axes.errorbar(
@@ -191,7 +191,7 @@ def draw(data: Data, out_dir: Path) -> None:
         style.save(figure, out_dir / "table_3_3")
         figure, rows = plt.subplots(3, 1, figsize=(9, 7.5), sharex=True, layout="constrained")
         for axes, yaw_rate in zip(rows, YAW_RATES, strict=True):
-            case = case_name("full", yaw_rate)
+            case = case_name(BUILT, yaw_rate)
             for i, name in enumerate(order):
                 values = data.trace(case, name)
                 t_s = 5.0 + np.arange(values.size) / TRACE_HZ
@@ -203,7 +203,7 @@ def draw(data: Data, out_dir: Path) -> None:
         style.save(figure, out_dir / "fig_3_4a")
         figure, rows = plt.subplots(3, 1, figsize=(9, 6), sharex=True, layout="constrained")
         for axes, yaw_rate in zip(rows, YAW_RATES, strict=True):
-            case = case_name("full", yaw_rate)
+            case = case_name(BUILT, yaw_rate)
             for series, colour in (("y measured", style.TRUTH), ("y predicted", style.ESTIMATE)):
                 values = data.trace(case, series)
                 axes.plot(5.0 + np.arange(values.size) / TRACE_HZ, values, color=colour, lw=0.9, label=series)

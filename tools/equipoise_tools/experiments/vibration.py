@@ -11,7 +11,7 @@ from .. import metrics, mocap, names, style
 from ..style import plt
 from .data import Data, Ran
 from .framework import Result
-from .runs import NO_GATES, Case, Lab, equipoise_json
+from .runs import BUILT, NO_GATES, Case, Lab, equipoise_json
 
 COVERS = ("Fig. 6.24", "Fig. 6.24, band")
 DRIVE_MPS = (0.05, 0.10, 0.15, 0.20)
@@ -19,7 +19,7 @@ WHEEL_RADIUS_M, ROLLERS_OF_A_ROW = 0.0125, 6  # [T] 2.3.1: twelve rollers in two
 ALPHA_DEG, AZIMUTH_DEG = 60.0, -140.0
 ROLLER_TILT_RAD = 0.094  # (2.1): rows 6 mm apart, our guess
 FITTED = "rows 6 mm apart, six rollers each, are put in"
-WORLD = "full"
+WORLD = BUILT
 DURATION_S = 60.0
 LOWEST_RAD_S, HIGHEST_RAD_S = 12.0, 200.0  # above the balance loop's own motion
 
