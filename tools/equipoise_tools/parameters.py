@@ -24,7 +24,8 @@ HEAD = """# Parameters
 Written by `python -m equipoise_tools.parameters` from the firmware and [keys.toml](../config/keys.toml).
 Values are those of [config/mbbr.toml](../config/mbbr.toml) and [config/edumip.toml](../config/edumip.toml);
 `equipoise config explain KEY --config FILE` shows the same for any configuration. A key with `*` exists in
-each simulated world; its value is that of `full`. A row of a table has `[]`; its value is that of the first row.
+each simulated world; its value is that of `full`. A row of a table has `[]`; its value is that of the
+first row.
 """
 
 
