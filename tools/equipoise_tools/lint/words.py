@@ -30,6 +30,7 @@ TERMS = tuple(
         (r"MIPs?", "eduMIP"),
     )
 )  # fmt: skip
+UNREVISED = ("docs/faults.md",)  # is rewritten with the detector
 GENERATED = ("docs/experiments/", "docs/reports/", "docs/parameters.md")
 _CODE = re.compile(r"```.*?```|`[^`\n]*`|\]\([^)\s]*\)|<!--.*?-->", re.S)
 
@@ -48,6 +49,8 @@ def without_code(text: str) -> str:
 def words(tree: Tree) -> list[Finding]:
     findings = []
     for name in pages(tree):
+        if name in UNREVISED:
+            continue
         for number, line in enumerate(without_code(tree.text(name)).splitlines(), 1):
             for pattern, instead in TERMS:
                 findings += [
