@@ -13,6 +13,7 @@
 
 #include "app/design/analysis.hpp"
 #include "app/text/errors.hpp"
+#include "app/text/version.hpp"
 #include "equipoise/config.hpp"
 #include "python/episodes.hpp"
 

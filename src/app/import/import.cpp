@@ -147,9 +147,9 @@ void sample(const ImportedRows& rows, std::size_t k, const ImportMap& map, const
 
 ImportedRobot imported_robot(const std::string& path) {
   return with_robot(robot_type(path), path, [&](auto firmware) {
-    using Firmware = decltype(firmware);
-    using Robot = typename Firmware::Robot;
-    const auto loaded = Firmware::load(path, {});
+    using Known = decltype(firmware);
+    using Robot = typename Known::Robot;
+    const auto loaded = Known::load(path, {});
     const auto configured = load_robot(path, {});
     Choice choice;
     complete(*configured->type, &choice);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "app/cli/commands.hpp"
+#include "app/text/files.hpp"
 
 namespace equipoise::app {
 namespace {
