@@ -22,7 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import butter, sosfiltfilt
 from scipy.stats import kurtosis, rankdata
 
-from .paths import repository_root
+from .paths import UserError, repository_root
 
 HZ = 200
 HIGH_PASS_HZ = 20.0
@@ -53,7 +53,9 @@ def real_motions(path: Path) -> dict[str, np.ndarray]:
     return {name: picked[int(HZ * begin) : int(HZ * end)] for name, (begin, end) in MOTIONS.items()}
 
 
-def simulated(binary: Path, config: Path, robot: int, *, drive_mps: float, duration_s: float) -> np.ndarray:
+def simulated(
+    binary: Path, config: Path, robot: int, settings: list[str], *, drive_mps: float, duration_s: float
+) -> np.ndarray:
     """The same of a robot of the population; each has its own seed."""
     with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
         log = Path(folder) / "run.lcm"
@@ -61,7 +63,10 @@ def simulated(binary: Path, config: Path, robot: int, *, drive_mps: float, durat
         # How it shakes is asked, not who falls: nothing is judged.
         command += f" --estimator truth --set safety.detection=false --log {log}"
         command += f" --drive-mps {drive_mps} --duration-s {duration_s} --json -"
-        subprocess.run([str(binary), *command.split()], capture_output=True, check=False)
+        words = [str(binary), *command.split()] + [word for text in settings for word in ("--set", text)]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 1):  # 1: fell
+            raise UserError(done.stderr.strip())
         records = Log(log)[ch.SENSORS]
     calibration = tomllib.loads(config.read_text())["calibration"]
     turned = np.reshape(calibration["R_BS"], (3, 3)).T
@@ -70,9 +75,11 @@ def simulated(binary: Path, config: Path, robot: int, *, drive_mps: float, durat
     return np.hstack([gyro @ turned, accel @ turned])
 
 
-def simulated_motions(binary: Path, config: Path, robot: int) -> dict[str, np.ndarray]:
-    standing = simulated(binary, config, robot, drive_mps=0.0, duration_s=12.0)
-    rolling = simulated(binary, config, robot, drive_mps=ROLLING_M_S, duration_s=12.0)
+def simulated_motions(
+    binary: Path, config: Path, robot: int, settings: list[str] | None = None
+) -> dict[str, np.ndarray]:
+    standing = simulated(binary, config, robot, settings or [], drive_mps=0.0, duration_s=12.0)
+    rolling = simulated(binary, config, robot, settings or [], drive_mps=ROLLING_M_S, duration_s=12.0)
     return {"rest": standing[: HZ // 2], "standing": standing[3 * HZ :], "rolling": rolling[5 * HZ :]}
 
 
@@ -168,12 +175,13 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("log", type=Path, help="LOG278.TXT of pichim/Mini_Segway")
     parser.add_argument("--config", type=Path, default=repository_root() / "config/edumip.toml")
     parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="as of equipoise sim")
     parser.add_argument("--json", type=Path, help="write the numbers here")
     given = parser.parse_args(words)
     if not given.log.exists():
         parser.error(f"{given.log}: cannot be opened")
     binary = repository_root() / "build/host/equipoise"
-    made = [simulated_motions(binary, given.config, robot) for robot in range(1, given.robots + 1)]
+    made = [simulated_motions(binary, given.config, robot, given.set) for robot in range(1, given.robots + 1)]
     made = [motions for motions in made if whole(motions)]
     result = compare(real_motions(given.log), made)
     if given.json:
