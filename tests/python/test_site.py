@@ -8,6 +8,7 @@ import sys
 
 import pytest
 import yaml
+from equipoise_tools.names import DEGRADED_TABLE, SAFETY_TABLE
 from equipoise_tools.site_hooks import without_outer_links
 
 
@@ -75,10 +76,7 @@ def test_links_out_of_the_docs_become_names():
 
 def test_every_message_is_in_troubleshooting(root):
     page = (root / "docs/troubleshooting.md").read_text()
-    reasons = (root / "include/equipoise/actuate/safety_reasons.hpp").read_text()
-    modes = (root / "include/equipoise/actuate/degraded.hpp").read_text()
-    names = re.findall(r"\"(\w+)\"", reasons.split("kSafetyReasonNames")[1].split("};")[0])
-    names += re.findall(r"\{\"(\w+)\",", modes)
+    names = [row.name for row in (*SAFETY_TABLE, *DEGRADED_TABLE)]
     assert len(names) > 35
     numbered = {f"without_wheel_{i}" for i in (2, 3)}  # "without_wheel_1 to without_wheel_4"
     assert [name for name in names if f"`{name}`" not in page and name not in numbered] == []

@@ -317,8 +317,10 @@ TEST_P(Reason, IsRaisedByProductionCode) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Every, Reason,
-                         testing::Range(0U, static_cast<std::uint32_t>(kSafetyReasonNames.size())),
-                         [](const auto& test) { return kSafetyReasonNames[test.param]; });
+                         testing::Range(0U, static_cast<std::uint32_t>(app::safety_reasons().size())),
+                         [](const auto& test) {
+                           return std::string(app::safety_reasons()[test.param].name);
+                         });
 
 TEST(Reasons, ASoundRobotHasNone) {
   EXPECT_EQ(mbbr({}), 0U);
