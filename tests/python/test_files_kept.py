@@ -143,3 +143,9 @@ def test_a_table_that_is_not_needed_is_checked_all_the_same(do, root, tmp_path, 
 def test_what_a_terminal_would_obey_is_not_printed(do):
     assert "\x1b" not in do("sim", "--config", "\x1b]0;title\x07", status=2)
     assert "\x1b" not in do("sim\x1b[2J", status=2)
+
+
+def test_too_few_descriptors_are_said_and_not_waited_for(root):
+    command = f"ulimit -n 7; exec {root}/build/host/equipoise sim --config {root}/config/edumip.toml"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode == 2 and "only 7 files may be open" in done.stderr
