@@ -85,9 +85,9 @@ void check(const toml::table& ranges, const std::vector<const toml::table*>& wor
       known = known || target->is_table() != is_range;
       if (target->is_table()) tables.push_back(target->as_table());
     }
-    if (!known) throw ConfigError("population." + key + ": no world has such a key");
+    if (!known) throw ConfigError(key + ": no world has such a key");
     if (is_range) {
-      (void)range_of(node, "population." + key);
+      (void)range_of(node, key);
     } else {
       check(*nested, tables, key + ".");
     }
@@ -114,13 +114,17 @@ double normal_draw(std::int64_t robot, const std::string& key, std::size_t eleme
 }
 
 void check_population(const toml::table& root) {
-  const toml::table* ranges = root["population"].as_table();
   const toml::table* worlds = root["world"].as_table();
-  if (ranges == nullptr || worlds == nullptr) return;
+  if (worlds == nullptr) return;
   std::vector<const toml::table*> all;
-  for (const auto& [name, world] : *worlds)
-    if (world.is_table()) all.push_back(world.as_table());
-  check(*ranges, all, "");
+  for (const auto& [name, node] : *worlds) {
+    const toml::table* world = node.as_table();
+    if (world == nullptr) continue;
+    all.push_back(world);
+    const toml::table* own = (*world)["population"].as_table();
+    if (own != nullptr) check(*own, {world}, "world." + std::string(name.str()) + ".population.");
+  }
+  if (const toml::table* ranges = root["population"].as_table()) check(*ranges, all, "population.");
 }
 
 std::vector<Drawn> draw_robot(const std::string& path, const std::vector<std::string>& overrides,
