@@ -68,13 +68,37 @@ def test_a_log_of_one_name_leaves_the_others(do, root, tmp_path, known_log):
     do(*sim, "x.lcm", status=0)
     do(*sim, "essay.txt", status=0)
     assert "exists and is no log" in do(*sim, "robot.toml", status=1)
-    run = ["run", "--backend", "sim", "--telemetry", "off", "--config", str(config), "--duration-s", "1"]
+    run = [
+        "run",
+        "--backend",
+        "sim",
+        "--fidelity",
+        "nominal",
+        "--telemetry",
+        "off",
+        "--config",
+        str(config),
+        "--duration-s",
+        "1",
+    ]
     assert "exists and is no log" in do(*run, "--log", "robot.toml", status=1)
     assert {name: (tmp_path / name).read_bytes() for name in kept} == kept
 
 
 def test_an_earlier_log_of_the_same_name_is_kept(do, root, tmp_path):
-    run = ["run", "--backend", "sim", "--telemetry", "off", "--speed", "100", "--duration-s", "1"]
+    run = [
+        "run",
+        "--backend",
+        "sim",
+        "--fidelity",
+        "nominal",
+        "--telemetry",
+        "off",
+        "--speed",
+        "100",
+        "--duration-s",
+        "1",
+    ]
     for _ in range(2):
         do(*run, "--config", str(root / "config/edumip.toml"), "--log", "x.lcm", status=0)
     assert len(list(tmp_path.glob("x.*T*Z.lcm"))) == 1 and (tmp_path / "x.lcm").exists()
@@ -82,7 +106,18 @@ def test_an_earlier_log_of_the_same_name_is_kept(do, root, tmp_path):
 
 def test_a_log_that_is_deleted_in_flight_is_no_success(root, tmp_path):
     command = [root / "build/host/equipoise", "run", "--config", root / "config/edumip.toml"]
-    command += ["--backend", "sim", "--telemetry", "off", "--duration-s", "2", "--log", tmp_path / "x.lcm"]
+    command += [
+        "--backend",
+        "sim",
+        "--fidelity",
+        "nominal",
+        "--telemetry",
+        "off",
+        "--duration-s",
+        "2",
+        "--log",
+        tmp_path / "x.lcm",
+    ]
     with subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True) as run:
         while not (tmp_path / "x.lcm").exists():
             assert run.poll() is None
@@ -101,7 +136,20 @@ def test_a_name_that_is_not_utf8_has_its_result(root, tmp_path):
         "--backend",
         "sim",
     ]
-    command += ["--telemetry", "off", "--speed", "100", "--duration-s", "2", "--json", "-", "--log", name]
+    command += [
+        "--fidelity",
+        "nominal",
+        "--telemetry",
+        "off",
+        "--speed",
+        "100",
+        "--duration-s",
+        "2",
+        "--json",
+        "-",
+        "--log",
+        name,
+    ]
     done = subprocess.run(command, capture_output=True, timeout=PATIENCE_S)
     assert done.returncode == 0 and b'"ended": "finished"' in done.stdout
 

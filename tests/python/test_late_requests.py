@@ -20,7 +20,7 @@ class Robot:
         self.json = folder / "run.json"
         subprocess.run([self.binary, "keygen", self.key], check=True, stdout=subprocess.DEVNULL)
         command = [self.binary, "run", "--config", root / "config/edumip.toml", "--backend", "sim"]
-        command += ["--telemetry", "off", "--log", "off", "--json", self.json]
+        command += ["--fidelity", "nominal", "--telemetry", "off", "--log", "off", "--json", self.json]
         command += ["--command-url", self.url, "--command-key", self.key]
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=stderr)
 
