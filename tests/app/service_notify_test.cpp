@@ -1,5 +1,5 @@
 // What the service manager hears of a loop: ready, a beat while it ticks, silence when it hangs, its end.
-#include "app/run/service_notify.hpp"
+#include "app/guard/service_notify.hpp"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
