@@ -126,7 +126,9 @@ def test_shadow_of_a_healthy_run_is_quiet_and_of_a_scaled_gyro_is_not(root, tabl
     wrong.to_csv(tmp_path / "wrong.csv", index=False)
     out = checks(tmp_path / "wrong.csv", tmp_path / "map.toml")
     faulty = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
-    assert any(10 < alarm["t_s"] < 11 for alarm in faulty["alarms"])
+    alarm = faulty["alarms"][0]
+    assert 10 < alarm["t_s"] < 15 and alarm["hypothesis"] == "estimator_unhealthy"
+    assert alarm["ratio"] > alarm["bound"] > 0
 
 
 def test_shadow_runs_on_our_own_logs_of_both_robots(root, tmp_path):

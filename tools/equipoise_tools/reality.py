@@ -78,7 +78,10 @@ def noise(shadow: dict[str, Any], sensor: str) -> str:
     axes = [v for name, v in shadow.get("noise", {}).items() if name.startswith(sensor)]
     if not axes:
         return "-"
-    return " ".join(shown(v["log"], 1, 3) for v in axes) + f" (world: {shown(axes[0]['configured'], 1, 3)})"
+    return (
+        " ".join(shown(v["log"], 1, 3) for v in axes)
+        + f" (the world's chip: {shown(axes[0]['configured'], 1, 3)})"
+    )
 
 
 def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
