@@ -6,14 +6,11 @@
 #include <numeric>
 
 #include "app/import/regression.hpp"
+#include "app/import/signals.hpp"
 
 namespace equipoise::app {
 namespace {
 
-using Series = std::vector<double>;
-
-constexpr double kLow_Hz = 0.5;  // balancing moves in this band: below it biases, above it vibration
-constexpr double kHigh_Hz = 5.0;
 constexpr double kRight = 1.4;         // so far off may be a radius, a track, an accelerometer's scale
 constexpr double kRightOfForce = 5.0;  // what the specific force says of small motions, shaken as it is
 constexpr double kNearUnit = 0.2;      // as close to a factor of units is a mistake of units
@@ -137,35 +134,6 @@ Check check_norm(const ImportedRows& rows) {
 
 // ---- sensors against each other, every tick
 
-/// What balancing moves, of any number of signals alike: their phases to each other stay.
-class Band {
- public:
-  Series operator()(const Series& x) const {
-    return smooth(difference(smooth(smooth(x, kHigh_Hz), kHigh_Hz), kLow_Hz), 2.0 * kHigh_Hz);
-  }
-
- private:
-  static Series smooth(const Series& x, double hz) {
-    const double share = 1.0 - std::exp(-2.0 * kPi * hz * kTickS);
-    Series y;
-    double s = x.front();
-    for (const double each : x) y.push_back(s += share * (each - s));
-    return y;
-  }
-  static Series difference(const Series& x, double hz) {
-    const Series slow = smooth(x, hz);
-    Series y(x.size());
-    for (std::size_t k = 0; k < x.size(); ++k) y[k] = x[k] - slow[k];
-    return y;
-  }
-};
-
-Series derivative(const Series& x) {
-  Series y(x.size(), 0.0);
-  for (std::size_t k = 1; k + 1 < x.size(); ++k) y[k] = (x[k + 1] - x[k - 1]) / (2.0 * kTickS);
-  return y;
-}
-
 /// The rows on a grid of ticks, between them by a line.
 struct Grid {
   Series gyro[3], accel[3], roll[2], drive_roll[2], yaw, wheel_half_difference, drive_half_difference;
@@ -224,26 +192,6 @@ struct Grid {
   }
 };
 
-Series combine(const Series& a, double factor, const Series& b) {
-  Series out(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) out[k] = a[k] + factor * b[k];
-  return out;
-}
-Series scaled(double factor, Series x) {
-  for (double& each : x) each *= factor;
-  return x;
-}
-Series integral(const Series& x) {
-  Series y(x.size(), 0.0);
-  for (std::size_t k = 1; k < x.size(); ++k) y[k] = y[k - 1] + 0.5 * kTickS * (x[k] + x[k - 1]);
-  return y;
-}
-Series product(const Series& a, const Series& b) {
-  Series out(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) out[k] = a[k] * b[k];
-  return out;
-}
-
 /// What the specific force says of the gyro (its first coefficient) and of the wheels: seen from the body,
 /// gravity turns against the gyro, and the axis of rolling accelerates as the wheels do.
 std::vector<Coefficient> against_accel(const Grid& g, const ImportedRobot& robot, int axis) {
@@ -256,10 +204,6 @@ std::vector<Coefficient> against_accel(const Grid& g, const ImportedRobot& robot
                               derivative(rate));
   const Series wheels = scaled(-sign * r, derivative(derivative(g.roll[axis])));
   return g.fit({gyro, wheels}, felt);
-}
-
-double mean_square(const Series& x) {
-  return std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size());
 }
 
 std::string shown(const Coefficient& c) {
