@@ -131,7 +131,7 @@ void filter(const std::string& file, const std::string& form, int times, MbbrFir
   const auto& ekf = config.estimators.ekf;
   const MbbrEkfModel model(config.robot, ekf.disturbance_time_constant_s);
   if (form == "dense") return steps(KalmanFilter<MbbrEkfModel>(model, ekf.filter), times);
-  steps(MbbrEkf::Filter(model, ekf.filter), times);
+  steps(MbbrEkf::Filter(model, ekf.filter, ekf.precision), times);
 }
 
 void filter(const std::string& file, const std::string& form, int times, MipFirmware /*robot*/) {
@@ -139,7 +139,7 @@ void filter(const std::string& file, const std::string& form, int times, MipFirm
   const auto& ekf = config.estimators.ekf;
   const MipEkfModel model(config.robot, ekf.options, ekf.disturbance_time_constant_s);
   if (form == "dense") return steps(KalmanFilter<MipEkfModel>(model, ekf.filter), times);
-  steps(MipEkf::Filter(model, ekf.filter), times);
+  steps(MipEkf::Filter(model, ekf.filter, ekf.precision), times);
 }
 
 /// (4.30)-(4.34) as printed, until a step is below 1e-10; forwards. In 20 steps at most.

@@ -98,7 +98,7 @@ def test_the_bridges_inversion_costs_two_fifths_of_newtons(machine_counts):
     assert bridge["inversion"] <= 0.4 * bridge["newton"]
 
 
-def test_the_whole_firmwares_load_is_its_instructions_and_the_arithmetics_further_cycles():
+def test_the_whole_firmwares_load_is_the_ticks_cycles_and_what_the_other_instructions_take():
     console = """VM: running
 equipoise: warning
 {"instructions":{"guard":1000.4,"kernel":2000.0,"loop":3000.0,"threads":4000.0},"load":"mbbr"}
@@ -109,5 +109,6 @@ equipoise: warning
     assert firmware["mbbr"] == {"guard": 1000, "kernel": 2000, "loop": 3000, "threads": 4000}
     robots = {r: {"tick": 1500, "tick_cycles": 41500} for r in count_page.ROBOTS}
     load = count_page.whole_load(firmware, robots)
-    assert load["mbbr"] == pytest.approx({1: 0.01, 2: 0.012})  # 50,000 and 60,000 cycles of 5,000,000
-    assert load["mip"] == pytest.approx({1: 0.012, 2: 0.016})
+    # 41,500 and twice, 3 or 4 times 8,500 cycles, of 5,000,000
+    assert load["mbbr"] == pytest.approx({2: 0.0117, 3: 0.0134, 4: 0.0151})
+    assert load["mip"] == pytest.approx({2: 0.0157, 3: 0.0194, 4: 0.0231})

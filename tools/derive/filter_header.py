@@ -208,7 +208,9 @@ def render(filter: Filter) -> str:
         "};",
         "",
     ]
-    about_file = [f"Layout of the {filter.robot.upper()}'s straight-line filter in {filter.robot}_filter.cpp."]
+    about_file = [
+        f"Layout of the {filter.robot.upper()}'s straight-line filter in {filter.robot}_filter.cpp."
+    ]
     return _file(filter, "hpp", about_file, [f'#include "generated/{filter.robot}_model.hpp"'], body)
 
 
@@ -217,7 +219,7 @@ def render_code(filter: Filter) -> str:
     lines = {step: getattr(filter, step).lines() for step in ("ahead", "predict", "correct")}
     early = [line for code in lines.values() for line in ("  {", *code.early, "  }") if code.early]
     body = [
-        f"template <class Real>",
+        "template <class Real>",
         f"using Constants = {name}::Constants<Real>;",
         "",
         f"void {name}::prepare(Constants<double>& k) noexcept {{",
@@ -242,5 +244,9 @@ def render_code(filter: Filter) -> str:
         "F P F' as row operations on a packed triangle, scalar measurements with masks instead of branches.",
         f"The model in robots/{filter.robot}/ekf.hpp is the readable form and the reference in tests.",
     ]
-    includes = [f'#include "generated/{filter.robot}_filter.hpp"', "", '#include "equipoise/estimate/lanes.hpp"']
+    includes = [
+        f'#include "generated/{filter.robot}_filter.hpp"',
+        "",
+        '#include "equipoise/estimate/lanes.hpp"',
+    ]
     return _file(filter, "cpp", about, includes, body)
