@@ -18,7 +18,8 @@ void allow_another_robot(SafetyParams* safety) {
 
 void doubt_nothing(const Choice& choice, SafetyParams* safety) {
   if (choice.fidelity.empty() && choice.backend != "lockstep")
-    throw ConfigError("safety.detection = false: simulated robots only; a real one keeps its fault detection");
+    throw ConfigError(
+        "safety.detection = false: simulated robots only; a real one keeps its fault detection");
   constexpr double kNever = std::numeric_limits<double>::infinity();
   safety->max_innovation = kNever;
   safety->max_tilt_sigma_rad = kNever;

@@ -58,8 +58,14 @@ bool is_regular_or_absent(const std::string& path) {
 }  // namespace
 
 bool LogWriter::create(const std::string& path) {
-  const int flags = O_WRONLY | O_CREAT | O_CLOEXEC | (is_regular_or_absent(path) ? O_EXCL : 0);
+  // Not waiting for somebody to read a pipe, but waiting for him to read on.
+  const int flags = O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK | (is_regular_or_absent(path) ? O_EXCL : 0);
   const int fd = ::open(path.c_str(), flags, 0644);
+  if (fd >= 0) fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
+  if (fd < 0 && errno == ENXIO) {
+    error_ = path + ": log cannot be created: is a pipe that nobody reads";
+    return false;
+  }
   if (fd < 0 || ((flags & O_EXCL) != 0 && flock(fd, LOCK_EX | LOCK_NB) != 0)) {
     error_ = path + ": log cannot be created: " + std::strerror(errno);
     if (fd >= 0) ::close(fd);
@@ -75,11 +81,6 @@ bool LogWriter::create(const std::string& path) {
 bool LogWriter::open(const std::string& path, const LogLimits& limits) {
   path_ = path;
   limits_ = limits;
-  std::error_code ignored;
-  if (std::filesystem::is_fifo(path, ignored)) {
-    error_ = path + ": log cannot be created: is a pipe";
-    return false;
-  }
   if (is_regular_or_absent(path) && !existing_log_parts(path).empty()) {
     if (std::filesystem::exists(path) && !is_log_or_empty(path)) {
       error_ = path + ": exists and is no log; choose another name";

@@ -10,6 +10,7 @@
 #include "app/commission/board_edit.hpp"
 #include "app/commission/simulated_stand.hpp"
 #include "app/io/mock.hpp"
+#include "app/text/files.hpp"
 #include "equipoise/config.hpp"
 #include "robots/mbbr/config.hpp"
 #include "robots/mip/config.hpp"

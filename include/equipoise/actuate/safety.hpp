@@ -48,7 +48,7 @@ struct SafetyParams {
   bool needs_attitude = false;
   double min_battery_V = 6.0;     // for half a second: two LiPo cells
   double cutoff_battery_V = 5.5;  // for five ticks: the supply is going
-  bool detection = true;  // false: no sensor and no motor is doubted; simulation only, for twin runs
+  bool detection = true;          // false: no sensor and no motor is doubted; simulation only, for twin runs
   double max_innovation = 2.5;    // normalised innovation, mean over about ten ticks; back below a half: well
   double max_innovation_published = 20.0;  // the same for [T]'s own filter, which trusts itself more
   double max_innovation_s = 0.05;          // above it for longer

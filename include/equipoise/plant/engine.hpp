@@ -1,6 +1,7 @@
 // A rigid-body engine that is not ours, behind a simulated robot's own motors, gears, friction and sensors.
-// In: motor command per tick; torques at the joints and forces for each step of the engine -> out: raw samples.
-// Each robot's world in an engine (robots/*/engine_world.hpp) says what its joints are. Simulation only.
+// In: motor command per tick; torques at the joints and forces for each step of the engine -> out: raw
+// samples. Each robot's world in an engine (robots/*/engine_world.hpp) says what its joints are. Simulation
+// only.
 #pragma once
 
 #include <cmath>
@@ -26,7 +27,8 @@ class Engine {
   virtual ~Engine() = default;
   /// At rest on the floor.
   virtual void start(const Mat3& R_WB, EngineMotion* motion) = 0;
-  /// One step with a torque at each joint, a push at the body's centre of mass, and a force on the ball or axle.
+  /// One step with a torque at each joint, a push at the body's centre of mass, and a force on the ball or
+  /// axle.
   virtual void step(const Vec3& joint_torque_N_m, const Vec2& push_W_N, const Vec2& drag_W_N,
                     EngineMotion* motion) = 0;
 };
@@ -37,8 +39,8 @@ class EngineBody {
   EngineBody(const Calibration& calibration, const WorldParams& world, int wheels, double weight_N,
              Engine& engine);
 
-  /// Advances one tick; `step()` takes one step of the engine by `drive()`. The bridges take the command at the
-  /// nearest step.
+  /// Advances one tick; `step()` takes one step of the engine by `drive()`. The bridges take the command at
+  /// the nearest step.
   template <class Motors, class Step>
   void advance(const MotorCommand& command, Motors& motors, Step&& step) {
     if (command.enable) held_ = false;

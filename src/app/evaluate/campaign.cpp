@@ -1,4 +1,5 @@
-// `equipoise campaign`: every fault in every phase of a run, and the soak; docs/reports/reliability.md from it.
+// `equipoise campaign`: every fault in every phase of a run, and the soak; docs/reports/reliability.md from
+// it.
 #include <algorithm>
 #include <cstdio>
 #include <fstream>

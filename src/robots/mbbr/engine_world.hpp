@@ -1,6 +1,6 @@
-// The MBBR in another engine: our motors, gears, rollers, friction and sensors, its rigid bodies and contacts.
-// The engine's joint is the ball against the body, body axes. In: motor command per tick -> out: raw samples,
-// and the truth. Simulation only.
+// The MBBR in another engine: our motors, gears, rollers, friction and sensors, its rigid bodies and
+// contacts. The engine's joint is the ball against the body, body axes. In: motor command per tick -> out:
+// raw samples, and the truth. Simulation only.
 #pragma once
 
 #include "equipoise/plant/engine.hpp"
@@ -30,8 +30,8 @@ class MbbrEngineWorld {
   MbbrDrive::Motors motors_;
   MbbrDrive drive_;
   EngineBody body_;
-  Vec3 seen_B_rad_ = Vec3::Zero();         // ball against body, as the wheels' nominal axes report it
-  Vec3 others_B_rad_s2_ = Vec3::Zero();    // acceleration of the joint by all but our torque, a step ago
+  Vec3 seen_B_rad_ = Vec3::Zero();       // ball against body, as the wheels' nominal axes report it
+  Vec3 others_B_rad_s2_ = Vec3::Zero();  // acceleration of the joint by all but our torque, a step ago
 };
 
 }  // namespace equipoise

@@ -28,7 +28,7 @@ inline constexpr std::array<const char*, 5> kMbbrEstimatorNames{"ekf", "ekf13_pu
 
 struct MbbrEstimatorParams {
   MbbrEstimatorId active = MbbrEstimatorId::kEkf;
-  bool compare = false;  // run all of them, not only the active one
+  bool compare = false;   // run all of them, not only the active one
   bool detection = true;  // false: every sensor is used as it comes
   MbbrEkf::Params ekf;
   KalmanFilter<MbbrPublishedModel>::Params ekf13_published;

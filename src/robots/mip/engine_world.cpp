@@ -9,7 +9,8 @@ MipEngineWorld::MipEngineWorld(const MipParameters& robot, const MotorParameters
       kinematics_(robot_),
       mobility_(wheel_mobility(robot_)),
       motors_(motor, calibration, world.common),
-      body_(calibration, world.common, Mip::kWheels, (robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2, engine) {}
+      body_(calibration, world.common, Mip::kWheels, (robot_.m_b + 2.0 * robot_.m_w) * kGravity_m_s2,
+            engine) {}
 
 Vec<kMaxMotors> MipEngineWorld::encoders() const noexcept {
   Vec<kMaxMotors> angles = Vec<kMaxMotors>::Zero();

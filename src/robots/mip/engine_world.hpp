@@ -1,6 +1,6 @@
 // The eduMIP in another engine: our motors, gears, friction and sensors, its rigid bodies and tyres. The
-// engine's joints are the wheels against the body, in the order of the equations. In: motor command per tick ->
-// out: raw samples, and the truth. Simulation only.
+// engine's joints are the wheels against the body, in the order of the equations. In: motor command per tick
+// -> out: raw samples, and the truth. Simulation only.
 #pragma once
 
 #include "equipoise/plant/engine.hpp"

@@ -37,7 +37,7 @@ inline constexpr std::array<const char*, 7> kMipEstimatorNames{
 struct MipEstimatorParams {
   MipEstimatorId active = MipEstimatorId::kEkf;
   bool compare = false;                  // run all of them, not only the active one
-  bool detection = true;  // false: every sensor is used as it comes
+  bool detection = true;                 // false: every sensor is used as it comes
   double complementary_weight = 0.98;    // of the gyro, (3.29)
   double heading_time_constant_s = 0.5;  // gyro above, encoders below
   KalmanFilter<MipInclinometerModel>::Params complementary_kf;
