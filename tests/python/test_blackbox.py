@@ -195,11 +195,14 @@ def test_a_new_start_keeps_the_last_log(root, tmp_path):
     log = tmp_path / "run.lcm"
     start_again(root, log)
     first = log.read_bytes()
-    (tmp_path / "run.0001.lcm").write_bytes(first)  # as if it had been rotated
+    part = (
+        first[:4] + (1_000_000).to_bytes(8, "big") + first[12:]
+    )  # its events go on: as if it had been rotated
+    (tmp_path / "run.0001.lcm").write_bytes(part)
     start_again(root, log)
     kept = sorted(path.name for path in tmp_path.glob("run.*Z*.lcm"))
     assert len(kept) == 2 and all(re.fullmatch(r"run\.\d{8}T\d{6}Z(\.0001)?\.lcm", name) for name in kept)
-    assert [(tmp_path / name).read_bytes() for name in kept] == [first, first]
+    assert [(tmp_path / name).read_bytes() for name in kept] == [part, first]
     assert len(read_log(log)["EQUIPOISE_SENSORS"]) == 5  # not what was kept
 
 

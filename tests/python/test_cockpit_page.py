@@ -84,7 +84,7 @@ def test_arms_drives_stops_and_survives_a_restart(page, cockpit):
     assert cockpit.token not in page.url
     # Read-only and disarmed until somebody takes control.
     assert text(page, "#arm-state").lower() == "disarmed"
-    assert "nobody has asked for the motors" in text(page, "#reasons")
+    assert "no arm request" in text(page, "#reasons")
     assert page.locator("#arm").is_disabled()
     page.keyboard.down("w")
     page.wait_for_timeout(300)

@@ -131,6 +131,7 @@ def test_both_worlds_agree_on_the_typical_robot(root, config, yaw_hz, drive_mps)
 @pytest.mark.slow
 def test_a_twin_shows_what_detection_did(root):
     trial = {"robot": 3, "seed": 3, "yaw_hz": 1.0, "drive_mps": 0.2, "duration_s": 6.0, "floor": "disturbed"}
+    trial["fidelity"] = "built2025"
     row = mujoco_engine.judged(trial, str(root / "config/mbbr.toml"), [], twins=True)
     assert {"off_though_it_stands", "saved_by_detector", "excluded_healthy"} <= row.keys()
     assert row["off_though_it_stands"] == (row["ended"] == "disarmed")

@@ -31,7 +31,7 @@ def command(root, *arguments) -> dict:
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_run_gives_the_numbers_of_the_command(root, robot):
-    asked = {"yaw_hz": 0.5, "drive_mps": 0.1, "duration_s": 6.0, "seed": 7, "fidelity": "full"}
+    asked = {"yaw_hz": 0.5, "drive_mps": 0.1, "duration_s": 6.0, "seed": 7, "fidelity": "built2025"}
     options = [word for key, value in asked.items() for word in (f"--{key.replace('_', '-')}", value)]
     options += ["--robot", 3, "--set", "friction.compensation=0.9", "--compare", "--log", "off"]
     said = command(root, "sim", "--config", ROBOTS[robot], *options, "--telemetry", "off")
@@ -291,7 +291,7 @@ def test_the_number_of_threads_changes_nothing(jobs):
 
     def flown(threads):
         envs = envs_module.BalanceVectorEnv(
-            "mip", num_envs=5, max_episode_steps=30, fidelity="full", population=(1, 50), jobs=threads
+            "mip", num_envs=5, max_episode_steps=30, fidelity="built2025", population=(1, 50), jobs=threads
         )
         first, _ = envs.reset(seed=9)
         steps = [envs.step(np.full((5, 2), 0.02))[0] for _ in range(70)]  # each is reset twice
@@ -302,7 +302,7 @@ def test_the_number_of_threads_changes_nothing(jobs):
 
 def test_a_robot_that_cannot_be_drawn_is_named_from_whatever_thread():
     envs_module = pytest.importorskip("equipoise_robot.envs")
-    envs = envs_module.BalanceVectorEnv("mip", num_envs=4, population=(-9, -9), fidelity="full", jobs=2)
+    envs = envs_module.BalanceVectorEnv("mip", num_envs=4, population=(-9, -9), fidelity="built2025", jobs=2)
     with pytest.raises(eq.UserError, match="robot_number"):
         envs.reset(seed=1)
 

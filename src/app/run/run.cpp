@@ -135,7 +135,7 @@ int run(RunArguments a) {
   if (a.backend == "lockstep") return run_lockstep(a, robot);
   if (a.backend == "sim") return run_simulated(a, robot);
   const Board board = load_board(a.board);
-  if (board.robot != robot.name) {
+  if (board.robot.compare(robot.name) != 0) {
     throw InputError(a.board + ": board.robot: \"" + board.robot + "\" where " + a.config + " says \"" +
                      robot.name + "\"");
   }
@@ -167,7 +167,7 @@ void add_run(Subcommand app) {
   command.option(
       "--fault", a->faults,
       "sim: break a part, NAME@T or NAME@T+D: at T seconds, for D seconds; an unknown name lists them");
-  a->choice.fidelity = "full";
+  a->choice.fidelity = "built2025";
   command.option("--fidelity", a->choice.fidelity, "sim: which world").show_default().one_of(kFidelityNames);
   command.option("--robot", a->robot_number, "sim: draw this robot from [population]; 0: the typical one")
       .show_default()

@@ -28,7 +28,7 @@ OS_HEADERS = re.compile(
     r"|filesystem|chrono|csignal|ctime|cstdio|cstdlib|clocale|locale|regex"
 )
 LIBRARIES_OUTSIDE_CORE = re.compile(r"lcm/.*|toml.*|CLI/.*|nlohmann/.*|sodium.*|gpiod.*|equipoise/\w+_t\.hpp")
-C_HEADERS_IN_CORE = ("math.h", "stdbool.h", "stdint.h", "stddef.h", "float.h")
+C_HEADERS_IN_CORE = ("math.h", "stdbool.h", "stdint.h", "stddef.h", "float.h", "arm_neon.h", "xmmintrin.h")
 
 _MODULE = re.compile(r"src/app/(\w+)/")
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.M)
