@@ -107,7 +107,7 @@ def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
         source = content["source"]
         origin.append(
             f"| {name} | [{source['repository']}](https://github.com/{source['repository']}) "
-            f"{source['commit']} | `{source['path']}` | {source['licence']} | `{source['sha256'][:16]}` |"
+            f"{source['commit']} | {source['path']} | {source['licence']} | `{source['sha256'][:16]}` |"
         )
     return "\n".join(
         [

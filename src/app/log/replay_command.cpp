@@ -161,7 +161,7 @@ void add_replay(Subcommand app) {
   command.option("--set", a->beside.set,
                  "key=value: run this tuning beside it, e.g. noise or weights; may be repeated");
   const Option shadow = command.flag(
-      "--shadow", a->shadow, "beside a robot that somebody else drove: alarms, NIS, tilt, prediction");
+      "--shadow", a->shadow, "beside a robot that other software drove: alarms, NIS, tilt, prediction");
   command.option("--config", a->config, "with --shadow: this robot, in place of the log's")
       .file()
       .needs(shadow);
