@@ -184,7 +184,7 @@ def test_says_a_fault_in_words(page, root, logs):
     try:
         page.goto(started.link)
         until(lambda: heard(page), "the page hears the robot")
-        until(lambda: "battery too low: charge it" in text(page, "#reasons"), "the fault is named")
+        until(lambda: "below safety.min_battery_V" in text(page, "#reasons"), "the fault is named")
         page.click("#take")
         page.wait_for_selector("#arm:enabled")
         page.click("#arm")

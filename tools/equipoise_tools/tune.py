@@ -221,7 +221,7 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--trials", type=int, default=80)
     parser.add_argument("--runs", nargs="+", type=pair, default=[pair(RUNS[0]), pair(RUNS[2]), pair(RUNS[5])])
     parser.add_argument("--duration-s", type=float, default=20.0)
-    parser.add_argument("--fidelity", default="full")
+    parser.add_argument("--fidelity", default="built2025")
     parser.add_argument("--seed", type=int, default=1, help="of the search")
     parser.add_argument("--out", type=Path, default=repository_root() / "build" / "tune")
     given = parser.parse_args(words)
