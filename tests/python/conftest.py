@@ -63,6 +63,7 @@ def cockpit(root, logs, multicast):
     """With the module's folder of logs."""
     from started_cockpit import Started
 
-    started = Started(root, logs)
+    # In the full world a robot may be disarmed at any moment; these tests are about the page.
+    started = Started(root, logs, "--", "--fidelity", "nominal")
     yield started
     started.end()
