@@ -23,17 +23,27 @@ Mat3 cross(const Vec3& v) {
   return m;
 }
 
-/// First-order low-pass forwards and backwards: no lag.
-std::vector<Vec2> without_lag(std::vector<Vec2> x) {
+/// First-order low-pass forwards and backwards: no lag. The ends go on mirrored through themselves, so that a
+/// log that begins in motion does not begin with a jerk.
+std::vector<Vec2> without_lag(const std::vector<Vec2>& signal) {
+  const std::size_t n = signal.size();
+  const std::size_t pad = std::min<std::size_t>(kBlock, n - 1);
+  std::vector<Vec2> x;
+  for (std::size_t k = pad; k > 0; --k) x.emplace_back(2.0 * signal.front() - signal[k]);
+  x.insert(x.end(), signal.begin(), signal.end());
+  for (std::size_t k = 1; k <= pad; ++k) x.emplace_back(2.0 * signal.back() - signal[n - 1 - k]);
   const double share = 1.0 - std::exp(-2.0 * kPi * kRollingBand_Hz * kTickS);
   for (std::size_t k = 1; k < x.size(); ++k) x[k] = x[k - 1] + share * (x[k] - x[k - 1]);
   for (std::size_t k = x.size() - 1; k > 0; --k) x[k - 1] = x[k] + share * (x[k - 1] - x[k]);
-  return x;
+  return {x.begin() + static_cast<std::ptrdiff_t>(pad), x.begin() + static_cast<std::ptrdiff_t>(pad + n)};
 }
 
 std::vector<Vec2> slope(const std::vector<Vec2>& x) {
   std::vector<Vec2> out(x.size(), Vec2::Zero());
   for (std::size_t k = 1; k + 1 < x.size(); ++k) out[k] = (x[k + 1] - x[k - 1]) / (2.0 * kTickS);
+  if (x.size() < 3) return out;
+  out.front() = out[1];
+  out.back() = out[x.size() - 2];
   return out;
 }
 
