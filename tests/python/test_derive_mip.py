@@ -98,6 +98,7 @@ def lagrange():
         encoder = dph + sign * p["d"] * dps / (2 * p["r"])
         energy += p["m_w"] * (p["r"] * (encoder + dth)) ** 2 / 2
         energy += (p["I_w1"] * (encoder + dth) ** 2 + p["I_w2"] * dps**2) / 2
+        energy += p["I_r"] * encoder**2 / 2
     L = energy - p["m_b"] * p["g"] * p["l"] * sp.cos(th)
     momentum = sp.Matrix([sp.diff(L, s) for s in mip.SPEEDS])
     mass = momentum.jacobian(mip.SPEEDS)
