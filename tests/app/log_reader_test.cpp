@@ -20,12 +20,13 @@ using testing::ElementsAre;
 
 const std::string kSync("\xED\xA1\xDA\x01", 4);
 
-std::string header(std::uint64_t utime, std::uint64_t channel_size, std::uint64_t data_size) {
+std::string header(std::uint64_t utime, std::uint64_t channel_size, std::uint64_t data_size,
+                   std::uint64_t number = 0) {
   std::string out = kSync;
   const auto put = [&out](std::uint64_t value, unsigned bytes) {
     for (unsigned i = bytes; i-- > 0;) out += static_cast<char>(value >> (8 * i));
   };
-  put(0, 8);
+  put(number, 8);
   put(utime, 8);
   put(channel_size, 4);
   put(data_size, 4);
@@ -34,6 +35,11 @@ std::string header(std::uint64_t utime, std::uint64_t channel_size, std::uint64_
 
 std::string event(const std::string& channel, const std::string& data, std::uint64_t utime = 0) {
   return header(utime, channel.size(), data.size()) + channel + data;
+}
+
+/// Of a log's later part: the events are numbered through all parts.
+std::string later_event(const std::string& channel, const std::string& data, std::uint64_t number) {
+  return header(0, channel.size(), data.size(), number) + channel + data;
 }
 
 struct Read {
@@ -110,15 +116,15 @@ class LogFiles : public LogFolder {
 
 TEST_F(LogFiles, ReadsAllPartsInOrder) {
   write("run.lcm", event("A", "1"));
-  write("run.0002.lcm", event("A", "3") + "torn");
-  write("run.0001.lcm", event("A", "2"));
+  write("run.0002.lcm", later_event("A", "3", 2) + "torn");
+  write("run.0001.lcm", later_event("A", "2", 1));
   const Read read = all(LogReader::open(path_));
   EXPECT_THAT(read.events, ElementsAre("A=1@0", "A=2@0", "A=3@0"));
   EXPECT_EQ(read.damaged, 4U);
 }
 
 TEST_F(LogFiles, ALogWhoseFirstPartsAreGoneIsRead) {
-  write("run.0007.lcm", event("A", "8"));
+  write("run.0007.lcm", later_event("A", "8", 7));
   EXPECT_THAT(all(LogReader::open(path_)).events, ElementsAre("A=8@0"));
 }
 
@@ -126,7 +132,7 @@ TEST_F(LogFiles, AnEventMayLieAcrossReadsAndAPartMayBeEmpty) {
   const std::string big(300000, 'd');  // a read is 262144 bytes
   write("run.lcm", event("A", big) + event("B", big) + event("C", "1"));
   write("run.0001.lcm", "");
-  write("run.0002.lcm", event("D", "2"));
+  write("run.0002.lcm", later_event("D", "2", 3));
   const Read read = all(LogReader::open(path_));
   ASSERT_EQ(read.events.size(), 4U);
   EXPECT_EQ(read.events[1], "B=" + big + "@0");
