@@ -203,7 +203,7 @@ def test_zsh_completes(binary, tmp_path, line, wanted):
 
 def test_a_long_job_says_how_long_it_will_take(binary, root, tmp_path):
     trials = tmp_path / "trials.json"
-    trials.write_text('{"trials": [' + ", ".join(['{"duration_s": 60}'] * 40) + "]}")
+    trials.write_text('{"trials": [' + ", ".join(['{"duration_s": 60, "fidelity": "built2025"}'] * 40) + "]}")
     arguments = [
         "trials",
         "--config",

@@ -56,19 +56,20 @@ template <int n, int m>
 void downdate(const float* weight, const float* Ph, float* P) noexcept {
   using Four = float __attribute__((vector_size(16), may_alias));
   const auto two = [](const float* from) { return reinterpret_cast<const __m64*>(from); };
+  constexpr std::ptrdiff_t kPairs = 2 * m;  // of one pair of states
   for (std::ptrdiff_t length = n; length > 0; length -= 2) {
     Four factor[m];
 #pragma GCC unroll 8
-    for (int i = 0; i < m; ++i) {
+    for (std::ptrdiff_t i = 0; i < m; ++i) {
       const FloatTwo both = twice(weight[i]) * load(Ph + 2 * i);
       factor[i] = Four{both[0], both[0], both[1], both[1]};
     }
     const float* along = Ph;
 #pragma GCC unroll 3
-    for (float* const end = P + length; P != end; P += 2, along += 2 * m) {
+    for (float* const end = P + length; P != end; P += 2, along += kPairs) {
       Four block = _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), two(P)), two(P + length));
 #pragma GCC unroll 8
-      for (int i = 0; i < m; ++i) {
+      for (std::ptrdiff_t i = 0; i < m; ++i) {
         const Four both = _mm_loadl_pi(_mm_setzero_ps(), two(along + 2 * i));
         block -= factor[i] * Four(_mm_movelh_ps(both, both));
       }
@@ -76,7 +77,7 @@ void downdate(const float* weight, const float* Ph, float* P) noexcept {
       _mm_storeh_pi(reinterpret_cast<__m64*>(P + length), block);
     }
     P += length;
-    Ph += 2 * m;
+    Ph += kPairs;
   }
 }
 #endif

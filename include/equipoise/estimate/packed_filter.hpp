@@ -55,14 +55,12 @@ class PackedFilter {
   void reset(const Vec<n>& x) noexcept {
     whole_.setZero();
     expected_whole_.setZero();
-    std::visit(
-        [&](auto& core) {
-          core.P.fill(0);
-          for (int i = 0; i < n; ++i)
-            core.P[place(i, i)] = static_cast<RealOf<decltype(core)>>(initial_variance_(i));
-          take(x, core);
-        },
-        core_);
+    on_core(core_, [&](auto& core) {
+      core.P.fill(0);
+      for (int i = 0; i < n; ++i)
+        core.P[place(i, i)] = static_cast<RealOf<decltype(core)>>(initial_variance_(i));
+      take(x, core);
+    });
     normalized_innovation_ = 0.0;
     row_nis_.fill(0.0);
     row_innovation_.fill(0.0);
@@ -72,30 +70,26 @@ class PackedFilter {
   void ahead(const Vec<p>& u, double dt, Vec<kMotion>& x) const noexcept {
     const Turnings from = x.template segment<Model::kTurnings>(Model::kTurning);
     x.template segment<Model::kTurnings>(Model::kTurning).setZero();
-    std::visit(
-        [&](const auto& core) {
-          using Real = RealOf<decltype(core)>;
-          const Vector<Real, p> acts(u);
-          Vector<Real, kMotion> moved(x);
-          Steps::ahead(core.k, acts.data(), static_cast<Real>(dt), moved.data());
-          moved.copy_to(x);
-        },
-        core_);
+    on_core(core_, [&](const auto& core) {
+      using Real = RealOf<decltype(core)>;
+      const Vector<Real, p> acts(u);
+      Vector<Real, kMotion> moved(x);
+      Steps::ahead(core.k, acts.data(), static_cast<Real>(dt), moved.data());
+      moved.copy_to(x);
+    });
     x.template segment<Model::kTurnings>(Model::kTurning) += from;
   }
 
   void predict(const Vec<p>& u) noexcept {
-    std::visit(
-        [&](auto& core) {
-          const Vector<RealOf<decltype(core)>, p> acts(u);
-          Steps::predict(core.k, acts.data(), core.x.data(), core.P.data() + Steps::kMiddleP);
-          show(core);
-        },
-        core_);
+    on_core(core_, [&](auto& core) {
+      const Vector<RealOf<decltype(core)>, p> acts(u);
+      Steps::predict(core.k, acts.data(), core.x.data(), core.P.data() + Steps::kMiddleP);
+      show(core);
+    });
   }
 
   void update(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
-    std::visit([&](auto& core) { update(core, u, y, use); }, core_);
+    on_core(core_, [&](auto& core) { update(core, u, y, use); });
     double nis = 0.0;
     int used = 0;
     for (std::size_t i = 0; i < m; ++i) {
@@ -107,12 +101,10 @@ class PackedFilter {
 
   /// Adds to the variances of `count` states from `first` on.
   void widen(int first, int count, double variance) noexcept {
-    std::visit(
-        [&](auto& core) {
-          for (int i = first; i < first + count; ++i)
-            core.P[place(i, i)] += static_cast<RealOf<decltype(core)>>(variance);
-        },
-        core_);
+    on_core(core_, [&](auto& core) {
+      for (int i = first; i < first + count; ++i)
+        core.P[place(i, i)] += static_cast<RealOf<decltype(core)>>(variance);
+    });
   }
 
   const Vec<n>& x() const noexcept { return x_; }
@@ -168,14 +160,20 @@ class PackedFilter {
     return result;
   }
 
+  /// f(core) in its precision. std::visit might throw, as far as the compiler knows.
+  template <class Either, class F>
+  static auto on_core(Either& either, F&& f) noexcept {
+    auto* const in_double = std::get_if<Core<double>>(&either);
+    return in_double != nullptr ? f(*in_double) : f(*std::get_if<Core<float>>(&either));
+  }
+
   static constexpr std::size_t place(int row, int column) noexcept {
     const int i = row < column ? row : column;
     const int j = row < column ? column : row;
     return static_cast<std::size_t>(i * n - 2 * (i / 2) * ((i - 1) / 2) + j - i / 2 * 2);
   }
   double P_at(int row, int column) const noexcept {
-    return std::visit([&](const auto& core) { return static_cast<double>(core.P[place(row, column)]); },
-                      core_);
+    return on_core(core_, [&](const auto& core) { return static_cast<double>(core.P[place(row, column)]); });
   }
 
   template <class Real>
@@ -213,10 +211,10 @@ class PackedFilter {
   /// Whole radians leave the angles; exact in either precision.
   template <class Real>
   void keep_small(Core<Real>& core) noexcept {
-    constexpr Real kLargest = 4;
+    constexpr auto kLargest = static_cast<Real>(4);
     bool moved = false;
     for (int i = 0; i < Model::kTurnings; ++i) {
-      Real& angle = core.x[static_cast<std::size_t>(Model::kTurning + i)];
+      Real& angle = core.x[static_cast<std::size_t>(Model::kTurning) + static_cast<std::size_t>(i)];
       if (!(std::abs(angle) > kLargest) || !(std::abs(angle) < Real{1e9})) continue;
       const auto whole = static_cast<std::int32_t>(angle);
       angle -= static_cast<Real>(whole);

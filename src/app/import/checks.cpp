@@ -185,6 +185,7 @@ struct Grid {
   }
   std::vector<Coefficient> fit(const std::vector<Series>& x, const Series& y) const {
     std::vector<Series> parts;
+    parts.reserve(x.size());
     for (const Series& each : x) parts.push_back(part(each));
     const Series target = part(y);
     const double seconds = kTickS * static_cast<double>(target.size());

@@ -47,6 +47,7 @@ std::vector<double> channel_column(const Columns& columns, const Channel& channe
                                    const std::vector<double>& t_s, const std::vector<std::size_t>& used) {
   const std::vector<double> all = columns(channel.axes[axis]);
   std::vector<double> values;
+  values.reserve(used.size());
   for (const std::size_t row : used) values.push_back(all[row]);
   if (channel.low_pass_hz > 0.0) take_back(channel.low_pass_hz, t_s, &values);
   if (channel.quantum > 0.0)
@@ -247,6 +248,7 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
 std::vector<runtime::TickRecord> imported_ticks(const ImportedRows& rows, const ImportMap& map,
                                                 const ImportedRobot& robot) {
   std::vector<Held> drive;
+  drive.reserve(static_cast<std::size_t>(robot.wheels));
   for (int i = 0; i < robot.wheels; ++i)
     drive.emplace_back(rows.t_s, rows.drive, static_cast<std::size_t>(i));
   std::vector<runtime::TickRecord> ticks;

@@ -62,6 +62,7 @@ Channel read_imu(Section s, const Units& units) {
 
 Channel read_kind(Section s, const std::map<std::string, Units>& kinds) {
   std::vector<std::string> names;
+  names.reserve(kinds.size());
   for (const auto& [name, units] : kinds) names.push_back(name);
   const std::string kind = names[s.choice("kind", names)];
   Channel c = read_channel(s, kinds.at(kind));

@@ -129,8 +129,9 @@ Table read_float32_table(const std::string& path, const TableShape& shape) {
 Table read_table(const std::string& path, const TableShape& shape) {
   for (const char* other : {".mat", ".parquet", ".feather", ".h5", ".xlsx"}) {
     if (ends_in(path, other)) {
-      throw InputError(path + ": is no text; make a CSV of it: ./tools/table " + path + " > " +
-                       path.substr(0, path.rfind('.')) + ".csv");
+      std::string csv = path.substr(0, path.rfind('.'));
+      csv += ".csv";
+      throw InputError(path + ": is no text; make a CSV of it: ./tools/table " + path + " > " + csv);
     }
   }
   Table table = shape.float32 ? read_float32_table(path, shape) : read_text_table(path, shape);

@@ -83,7 +83,9 @@ void Shadow::print(std::FILE* out) const {
     std::fprintf(out, "  %s %.2f", row.c_str(), square.sum / square.count);
   std::fprintf(out, "\n  tilt against the smoother %.2f mrad (constant offset of %.1f apart)\n",
                1e3 * tilt_std_rad(*this), 1e3 * mean_of(tilt_error_rad[0]));
-  for (const auto& [time, a] : ahead) {
+  for (const auto& each : ahead) {
+    const std::string& time = each.first;
+    const Ahead& a = each.second;
     const auto line = [&](const char* what, double unit, RootMeanSquare Ahead::Errors::*of) {
       std::fprintf(out, "  %5s ahead, %s: model %.2f, persistence %.2f, constant rate %.2f mrad\n",
                    time.c_str(), what, unit * (a.model.*of).value(), unit * (a.persistence.*of).value(),
