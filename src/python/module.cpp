@@ -147,7 +147,10 @@ class PythonEngine : public Engine {
     read(motion);
   }
   void step(const Vec3& torque, const Vec2& push_W_N, const Vec2& drag_W_N, EngineMotion* motion) override {
-    Eigen::Map<Vec<7>>(in_.data()) << torque, push_W_N, drag_W_N;
+    Eigen::Map<Vec<7>> in(in_.data());
+    in.head<3>() = torque;
+    in.segment<2>(3) = push_W_N;
+    in.tail<2>() = drag_W_N;
     attention_.keep([this] { step_(); });
     read(motion);
   }

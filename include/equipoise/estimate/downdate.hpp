@@ -56,7 +56,7 @@ template <int n, int m>
 void downdate(const float* weight, const float* Ph, float* P) noexcept {
   using Four = float __attribute__((vector_size(16), may_alias));
   const auto two = [](const float* from) { return reinterpret_cast<const __m64*>(from); };
-  constexpr std::ptrdiff_t kPairs = 2 * m;  // of one pair of states
+  constexpr std::ptrdiff_t kPairs = std::ptrdiff_t{2} * m;  // of one pair of states
   for (std::ptrdiff_t length = n; length > 0; length -= 2) {
     Four factor[m];
 #pragma GCC unroll 8

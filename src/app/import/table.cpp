@@ -1,5 +1,6 @@
 #include "app/import/table.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -19,8 +20,10 @@ bool ends_in(const std::string& text, const std::string& end) {
 void split(std::string_view line, std::vector<std::string_view>* cells) {
   constexpr std::string_view kBlank = " \t\r\"";
   cells->clear();
-  const std::size_t found = line.find_first_of(",;\t");
-  const char separator = found == std::string_view::npos ? ' ' : line[found];
+  constexpr std::string_view kSeparators = ",;\t";
+  const auto* const found =
+      std::find_first_of(line.begin(), line.end(), kSeparators.begin(), kSeparators.end());
+  const char separator = found == line.end() ? ' ' : *found;
   while (true) {
     const std::size_t begin = line.find_first_not_of(separator == '\t' ? " \r\"" : kBlank);
     line.remove_prefix(begin == std::string_view::npos ? line.size() : begin);
@@ -129,9 +132,10 @@ Table read_float32_table(const std::string& path, const TableShape& shape) {
 Table read_table(const std::string& path, const TableShape& shape) {
   for (const char* other : {".mat", ".parquet", ".feather", ".h5", ".xlsx"}) {
     if (ends_in(path, other)) {
-      std::string csv = path.substr(0, path.rfind('.'));
-      csv += ".csv";
-      throw InputError(path + ": is no text; make a CSV of it: ./tools/table " + path + " > " + csv);
+      std::string todo = path;
+      todo += ": is no text; make a CSV of it: ./tools/table " + path + " > ";
+      todo.append(path, 0, path.rfind('.')) += ".csv";
+      throw InputError(todo);
     }
   }
   Table table = shape.float32 ? read_float32_table(path, shape) : read_text_table(path, shape);
