@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "app/trial/firmware.hpp"
-#include "app/trial/given_inputs.hpp"
+#include "equipoise/pipeline.hpp"
 
 namespace equipoise::app {
 
@@ -106,23 +106,48 @@ class FirmwareOf : public Firmware {
   Pipeline pipeline_;
 };
 
-/// Keeps what its estimators were given in the last tick.
+/// What the estimators of a tick are given beside its samples.
+template <class P>
+struct GivenInput {
+  typename P::Input u;
+  bool held;
+};
+
+/// Leaves what its estimators are given.
 template <class Robot, class P>
-class LeaderOf : public FirmwareOf<Robot, Tapped<P>> {
+class LeaderOf : public FirmwareOf<Robot, P> {
  public:
-  using Inputs = GivenInputs<typename P::Input>;
-  LeaderOf(const typename Tapped<P>::Params& params, std::shared_ptr<Inputs> inputs)
-      : FirmwareOf<Robot, Tapped<P>>(params), inputs_(std::move(inputs)) {
-    this->pipeline().estimators().tap([this](auto* u, bool* held) { inputs_->keep(*u, *held); });
-  }
+  LeaderOf(const typename P::Params& params, std::shared_ptr<GivenInput<P>> given)
+      : FirmwareOf<Robot, P>(params), given_(std::move(given)) {}
   runtime::TickRecord tick(const RawSample& raw, const Command& asked,
                            const LoopState& loop) noexcept override {
-    inputs_->begin();
-    return FirmwareOf<Robot, Tapped<P>>::tick(raw, asked, loop);
+    *given_ = {this->pipeline().applied(), this->pipeline().held()};
+    return FirmwareOf<Robot, P>::tick(raw, asked, loop);
   }
 
  private:
-  std::shared_ptr<Inputs> inputs_;
+  std::shared_ptr<GivenInput<P>> given_;
+};
+
+/// Takes it: what it asks of the motors happens nowhere.
+template <class Robot, class P>
+class FollowerOf : public FirmwareOf<Robot, P> {
+ public:
+  FollowerOf(typename P::Params params, std::shared_ptr<const GivenInput<P>> given)
+      : FirmwareOf<Robot, P>(unanswered(std::move(params))), given_(std::move(given)) {}
+  runtime::TickRecord tick(const RawSample& raw, const Command& asked,
+                           const LoopState& loop) noexcept override {
+    this->pipeline().applied(given_->u, given_->held);
+    return FirmwareOf<Robot, P>::tick(raw, asked, loop);
+  }
+
+ private:
+  /// No encoder could answer what shakes the wheels.
+  static typename P::Params unanswered(typename P::Params p) {
+    p.safety.encoder_check_drive = 0.0;
+    return p;
+  }
+  std::shared_ptr<const GivenInput<P>> given_;
 };
 
 template <class Robot>
@@ -170,11 +195,9 @@ class ConfiguredRobotOf : public ConfiguredRobot {
  private:
   template <class P>
   static Retuning retuning_of(const typename P::Params& recorded, const typename P::Params& changed) {
-    const auto inputs = std::make_shared<GivenInputs<typename P::Input>>();
-    auto leader = std::make_unique<LeaderOf<Robot, P>>(tapped<P>(recorded, true), inputs);
-    auto follower = std::make_unique<FirmwareOf<Robot, Tapped<P>>>(tapped<P>(changed, false));
-    follower->pipeline().estimators().tap([inputs](auto* u, bool* held) { inputs->hand_on(u, held); });
-    return {std::move(leader), std::move(follower)};
+    const auto given = std::make_shared<GivenInput<P>>();
+    return {std::make_unique<LeaderOf<Robot, P>>(recorded, given),
+            std::make_unique<FollowerOf<Robot, P>>(changed, given)};
   }
 };
 
