@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "app/text/errors.hpp"
-#include "app/trial/firmware.hpp"
+#include "app/trial/firmware_of.hpp"
 #include "robots/robot_list.hpp"
 
 namespace equipoise::app {
@@ -150,19 +150,19 @@ ImportedRobot imported_robot(const std::string& path) {
   return with_robot(robot_type(path), path, [&](auto firmware) {
     using Known = decltype(firmware);
     using Robot = typename Known::Robot;
-    const auto loaded = Known::load(path, {});
-    const auto configured = load_robot(path, {});
+    const ConfiguredRobotOf<Known> configured(Known::load(path, {}));
+    const auto& config = configured.config;
     Choice choice;
-    complete(*configured->type, &choice);
-    const typename Robot::Kinematics kinematics(loaded.config.robot);
+    complete(*configured.type, &choice);
+    const typename Robot::Kinematics kinematics(config.robot);
     const auto wheels = [](const WheelValues& w) {
       return Vec<Robot::kWheels>(Eigen::Map<const Vec<Robot::kWheels>>(w.data()));
     };
     ImportedRobot robot;
     robot.wheels = Robot::kWheels;
-    robot.calibration = loaded.config.calibration;
-    robot.motor = loaded.config.motor;
-    robot.run = run_info(*configured, choice, 0);
+    robot.calibration = config.calibration;
+    robot.motor = config.motor;
+    robot.run = run_info(configured, choice, 0);
     robot.run.backend = "import";
     robot.rolling_radius_m = robot.run.rolling_radius_m;
     robot.input = [=](const WheelValues& w) {
@@ -172,11 +172,11 @@ ImportedRobot imported_robot(const std::string& path) {
       return axes;
     };
     if constexpr (Robot::kWheels == 2) {
-      robot.imu_height_m = loaded.config.robot.l_a.z();
+      robot.imu_height_m = config.robot.l_a.z();
       robot.rolling = [=](const WheelValues& w) { return Vec2(kinematics.phi(wheels(w)), 0.0); };
       robot.yaw = [=](const WheelValues& w) { return kinematics.psi(wheels(w)); };
     } else {
-      robot.imu_height_m = loaded.config.robot.l_a.z();
+      robot.imu_height_m = config.robot.l_a.z();
       robot.rolling = [=](const WheelValues& w) {
         return Vec2(kinematics.ball_from_wheels(wheels(w)).template head<2>());
       };
