@@ -25,6 +25,7 @@ struct MipAccess {
             {"wheel_radius_m", p.r},
             {"track_m", p.d},
             {"wheel_inertia_kg_m2", {p.I_w1, p.I_w2, p.I_w3}},
+            {"rotor_inertia_kg_m2", p.I_r},
             {"imu_position_m", {p.l_a.x(), p.l_a.y(), p.l_a.z()}},
             {"floor_slope_rad", {world.common.floor_slope_rad.x(), world.common.floor_slope_rad.y()}},
             {"step_s", world.common.step_s}};

@@ -106,7 +106,7 @@ def edumip(d: dict, floor: Floor) -> str:
     r = d["wheel_radius_m"]
     wheels = "".join(f"""
       <body name="{name}" pos="{x:.9g} 0 0">
-        <joint name="{name}" type="hinge" axis="1 0 0"/>
+        <joint name="{name}" type="hinge" axis="1 0 0" armature="{d["rotor_inertia_kg_m2"]:.9g}"/>
         <inertial pos="0 0 0" mass="{d["wheel_mass_kg"]:.9g}"
                   diaginertia="{inertia(d["wheel_inertia_kg_m2"])}"/>
         <geom type="sphere" size="{r:.9g}" friction="{friction}" condim="4" solref="0.002 1" conaffinity="0"
