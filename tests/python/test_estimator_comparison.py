@@ -167,4 +167,4 @@ def test_the_page_shows_what_the_data_say(root):
 
     text = (root / "docs/reports/estimators.md").read_text()
     shown = text.split(page.BEGIN, 1)[1].split(page.END, 1)[0].strip()
-    assert shown == page.tables(measure.read(root / "docs/reports/estimators.csv")).strip()
+    assert shown == page.tables(measure.read(root / "docs/reports/estimators.parquet")).strip()

@@ -197,13 +197,12 @@ def test_committed_pages_come_from_the_committed_data(name, root, tmp_path):
     committed = root / "docs" / "experiments"
     made = framework.load(name).report(data.read(name, committed), tmp_path)
     framework.write(name, made, tmp_path)
-    for suffix in ("md", "csv", "json"):
+    for suffix in ("md", "json"):
         file = f"{name}.{suffix}"
         assert (tmp_path / file).read_bytes() == (committed / file).read_bytes(), file
     for picture in made.pictures:
-        for suffix in ("png", "svg"):
-            file = f"{picture}.{suffix}"
-            assert (tmp_path / file).read_bytes() == (committed / file).read_bytes(), file
+        file = f"{picture}.png"
+        assert (tmp_path / file).read_bytes() == (committed / file).read_bytes(), file
 
 
 def test_committed_summary_comes_from_the_records_and_nothing_is_left_over(root):
@@ -212,7 +211,7 @@ def test_committed_summary_comes_from_the_records_and_nothing_is_left_over(root)
     known = set(framework.names())
     assert {file.stem for file in folder.glob("*.json")} == known
     pages = "".join(file.read_text() for file in folder.glob("*.md"))
-    for picture in [*folder.glob("*.png"), *folder.glob("*.svg")]:
+    for picture in folder.glob("*.png"):
         assert f"({picture.stem}.png)" in pages
 
 

@@ -26,7 +26,7 @@ from .style import plt
 BALL_M, BODY_R_M, BODY_Z_M = 0.032, 0.038, (0.030, 0.165)  # drawn size, about [T] Fig. 2.11
 CAMERA_AZIMUTH, CAMERA_ELEVATION = np.radians(-60.0), np.radians(18.0)
 SIDES = 8
-COLOURS = 32  # of the palette
+COLOURS = 16  # of the palette
 
 
 def rotation(theta: np.ndarray) -> np.ndarray:
@@ -128,7 +128,7 @@ class Scene:
 
     def frame(self, i: int, title: str) -> Image.Image:
         with plt.rc_context(style.RC):
-            figure = plt.figure(figsize=(6.0, 3.4), dpi=90)
+            figure = plt.figure(figsize=(6.0, 3.4), dpi=75)
             left = figure.add_axes((0.0, 0.12, 0.6, 0.78))
             left.set(aspect="equal", xlim=(-0.17, 0.17), ylim=(-0.06, 0.2))
             left.axis("off")
@@ -154,7 +154,7 @@ class Scene:
             figure.text(0.02, 0.04, f"{self.times[i]:5.1f} s", size=9, family="DejaVu Sans Mono")
             figure.text(0.14, 0.04, said, size=9, color=colour)
             data = io.BytesIO()
-            figure.savefig(data, format="png", dpi=90)
+            figure.savefig(data, format="png", dpi=75)
             plt.close(figure)
         return Image.open(data).convert("RGB")
 
@@ -173,8 +173,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("log", type=Path)
     parser.add_argument("--out", type=Path, required=True, help="the picture, .gif")
     parser.add_argument("--from-s", type=float, default=0.0)
-    parser.add_argument("--duration-s", type=float, default=12.0)
-    parser.add_argument("--fps", type=float, default=12.5)
+    parser.add_argument("--duration-s", type=float, default=10.0)
+    parser.add_argument("--fps", type=float, default=8.0)
     parser.add_argument("--title", default="MBBR, simulated: 1 turn per second, 0.1 m/s")
     given = parser.parse_args(arguments)
     if given.fps <= 0 or given.duration_s <= 0:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import matplotlib
+from PIL import Image
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -15,6 +17,7 @@ ESTIMATE = "#0072B2"
 OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F", "#8B6B3E")
 DASHES = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (6, 2, 1, 2, 1, 2)), (0, (8, 2)))
 DRIVE_PHASE = "#0072B2"
+COLOURS, DPI = 32, 90  # of a tracked picture: the width of a page
 
 RC = {
     "font.family": "DejaVu Sans",
@@ -27,7 +30,7 @@ RC = {
     "axes.spines.right": False,
     "axes.edgecolor": "#666666",
     "axes.grid": True,
-    "grid.color": "#E3E3E3",
+    "grid.color": "#D8D8D8",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.1,
     "legend.frameon": False,
@@ -53,13 +56,20 @@ def styled():
 
 
 def save(figure: plt.Figure, path: Path) -> None:
-    """PATH.png and PATH.svg, the same bytes every time; closes the figure."""
-    figure.savefig(path.with_suffix(".png"), dpi=100, metadata={"Software": None})
-    with plt.rc_context(
-        {"svg.hashsalt": "equipoise", "svg.fonttype": "none", "path.simplify_threshold": 0.5}
-    ):
-        figure.savefig(path.with_suffix(".svg"), metadata={"Date": None, "Creator": None})
+    """PATH.png, the same bytes every time, a quarter of its size by a palette; closes the figure."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=DPI)
     plt.close(figure)
+    flat = (
+        Image.open(drawn)
+        .convert("RGB")
+        .quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    )
+    palette = flat.getpalette() or []
+    background = 3 * flat.tobytes()[0]
+    palette[background : background + 3] = (255, 255, 255)  # the octree's is a shade darker
+    flat.putpalette(palette)
+    flat.save(path.with_suffix(".png"), optimize=True)
 
 
 def legend_above(figure: plt.Figure, axes: plt.Axes, columns: int = 5) -> None:

@@ -1,7 +1,7 @@
 """The MBBR's default filter beside an unscented and an error-state filter of its model, on the same samples.
 
 python -m equipoise_tools.estimator_comparison              the page's tables and figure, anew: 10 minutes
-python -m equipoise_tools.estimator_comparison --from-data  from docs/reports/estimators.csv
+python -m equipoise_tools.estimator_comparison --from-data  from docs/reports/estimators.parquet
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--robots", type=int, default=20)
     parser.add_argument("--duration", type=float, default=60.0, help="seconds of each flight")
     parser.add_argument("--seed", type=int, default=7)
-    parser.add_argument("--from-data", action="store_true", help="no flights: tables and figure from the CSV")
+    parser.add_argument("--from-data", action="store_true", help="no runs: from the data")
     parser.add_argument(
-        "--out", type=Path, default=repository_root() / "docs" / "reports", help="estimators.md, .csv, .png"
+        "--out", type=Path, default=repository_root() / "docs" / "reports", help="folder of the page"
     )
     options = parser.parse_args(arguments)
     if options.robots < 2 or options.duration < 8.0:
         parser.error("--robots: 2 or more; --duration: 8 or more")
-    table = options.out / "estimators.csv"
+    table = options.out / "estimators.parquet"
     if not options.from_data:
         began = time.monotonic()
         numbers = range(options.first, options.first + options.robots)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from . import drawn
 from .filters import FILTERS
@@ -87,16 +88,8 @@ def measure(
 
 
 def write(path: Path, rows: list[Row]) -> None:
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            writer.writerow({k: v if isinstance(v, str | int) else f"{v:.6g}" for k, v in row.items()})
+    pq.write_table(pa.Table.from_pylist(rows), path, compression="zstd", compression_level=19)
 
 
 def read(path: Path) -> list[Row]:
-    def value(name: str, text: str) -> float | str:
-        return text if name in ("world", "filter") else float(text)
-
-    with path.open(newline="") as file:
-        return [{k: value(k, v) for k, v in row.items()} for row in csv.DictReader(file)]
+    return pq.read_table(path).to_pylist()

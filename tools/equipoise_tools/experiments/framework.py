@@ -1,8 +1,7 @@
-"""Findings, their status, and how an experiment becomes a page, a CSV and a line of the summary."""
+"""Findings, their status, and how an experiment becomes a page and a line of the summary."""
 
 from __future__ import annotations
 
-import csv
 import importlib
 import json
 import math
@@ -116,7 +115,7 @@ class Result:
     data: Data
     values: list[Value] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
-    pictures: list[str] = field(default_factory=list)  # names, without .png and .svg
+    pictures: list[str] = field(default_factory=list)  # names, without .png
 
     def check(
         self,
@@ -270,8 +269,7 @@ def page(name: str, result: Result) -> str:
             f"{number(v.published)} | {number(v.ratio)} | {v.unit} |"
             for v in result.values
         ]
-    lines += ["", f"Why they differ: {result.differs}", ""]
-    lines += [f"All values: [{name}.csv]({name}.csv); every run: [Parquet](data/{name}.parquet)", ""]
+    lines += ["", f"Why they differ: {result.differs}", "", f"Every run: [Parquet](data/{name}.parquet)", ""]
     return "\n".join(lines)
 
 
@@ -286,22 +284,13 @@ def record_of(result: Result) -> dict:
 
 
 def write(name: str, result: Result, out_dir: Path) -> None:
-    """NAME.md, NAME.csv, and NAME.json for the summary."""
+    """NAME.md, and NAME.json for the summary."""
     out_dir.mkdir(parents=True, exist_ok=True)
     (out_dir / f"{name}.md").write_text(page(name, result))
-    with (out_dir / f"{name}.csv").open("w", newline="") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        head = (
-            "target quantity filter control world gains fitted median low_5 high_95 runs published ratio unit"
-        )
-        rows.writerow(head.split())
-        for v in result.values:
-            shown = (v.median, v.low, v.high, v.runs, v.published, v.ratio)
-            cells = ["" if x is None else f"{x:.6g}" for x in shown]
-            ran = [v.ran.filter, v.ran.control, v.ran.world, v.ran.gains, v.ran.fitted]
-            rows.writerow([v.target, v.what, *ran, *cells, v.unit])
-    record = json.dumps(record_of(result), indent=1, ensure_ascii=False)
-    (out_dir / f"{name}.json").write_text(record + "\n")
+    record = record_of(result)
+    findings = ",\n".join(json.dumps(f, ensure_ascii=False) for f in record.pop("findings"))
+    head = json.dumps(record, indent=1, ensure_ascii=False).removesuffix("\n}")
+    (out_dir / f"{name}.json").write_text(f'{head},\n "findings": [\n{findings}\n]}}\n')
 
 
 def summary(out_dir: Path) -> str:
