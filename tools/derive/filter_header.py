@@ -76,7 +76,7 @@ class Filter:
     constants: list[str]  # further members of Constants
     ahead: Emitter
     predict: Emitter
-    correct: Emitter
+    innovate: Emitter
     scripts: tuple[str, ...]  # which it comes from
 
     @property
@@ -116,7 +116,7 @@ def _places(name: str, about: str, places) -> list[str]:
 
 def _kept(filter: Filter) -> list[str]:
     lines = ["    // By prepare():"]
-    for name in ("ahead", "predict", "correct"):
+    for name in ("ahead", "predict", "innovate"):
         code = getattr(filter, name).lines()
         if code.pairs:
             lines.append(f"    alignas(2 * sizeof(Real)) Real {name}_pairs[{2 * code.pairs}];")
@@ -139,15 +139,18 @@ def _steps(filter: Filter) -> dict[str, list[tuple[str, str]]]:
     return {
         "ahead": [("const Real", f"u[{p}]"), ("Real", "dt"), ("Real", f"x[{filter.motion}]")],
         "predict": [("const Real", f"u[{p}]"), ("Real", f"x[{n}]"), ("Real*", "P")],
-        "correct": [
+        "innovate": [
             ("const Real", f"u[{p}]"),
             ("const Real", f"y[{m}]"),
             ("const bool", f"use[{m}]"),
-            ("Real", f"x[{n}]"),
+            ("const Real", f"R[{m}]"),
+            ("const Real", f"x[{n}]"),
             ("const Real*", "P"),
             ("Real*", "Ph"),
             ("Real", f"weight[{m}]"),
+            ("Real", f"step[{m}]"),
             ("Real", f"row_innovation[{m}]"),
+            ("Real", f"row_variance[{m}]"),
             ("Real", f"row_nis[{m}]"),
         ],
     }
@@ -165,10 +168,11 @@ def render(filter: Filter) -> str:
     about = {
         "ahead": ["x after dt with what acts, input and disturbance."],
         "predict": ["x, P after a tick with input u."],
-        "correct": [
-            "x after the samples y, of which those count whose flag is set, and what P loses: the sum of",
-            f"weight Ph Ph' over the rows. Ph[{n // 2}][{m}][2]: pairs of states, rows, state of the pair.",
-            "row_nis: squared innovation over its variance; 0 where not used, like the other two.",
+        "innovate": [
+            "What the samples y with variances R change, if their flag is set: x gains the sum of",
+            "step Ph over the rows, P loses that of weight Ph Ph'. Innovation and variance of a row: given",
+            "the rows before it whose flag is set. weight, step, row_nis: 0 where the flag is clear.",
+            f"Ph[{n // 2}][{m}][2]: pairs of states, rows, state of the pair.",
         ],
     }
     steps: list[str] = []
@@ -199,7 +203,6 @@ def render(filter: Filter) -> str:
         *[f"    {line}" for line in filter.constants],
         f"    Real B[{len(filter.B)}];",
         f"    Real Q[{len(filter.noise)}];",
-        f"    Real R[{m}];",
         *_kept(filter),
         "  };",
         "  /// Fills in what follows from the rest.",
@@ -216,7 +219,7 @@ def render(filter: Filter) -> str:
 
 def render_code(filter: Filter) -> str:
     name = filter.robot.capitalize() + "Filter"
-    lines = {step: getattr(filter, step).lines() for step in ("ahead", "predict", "correct")}
+    lines = {step: getattr(filter, step).lines() for step in ("ahead", "predict", "innovate")}
     early = [line for code in lines.values() for line in ("  {", *code.early, "  }") if code.early]
     body = [
         "template <class Real>",

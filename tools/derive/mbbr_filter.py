@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from . import mbbr_header
 from .filter_header import DT, Filter, ModelRows, add_noise, ahead
-from .packed import Covariance, by_pairs, correct, heun
+from .packed import Covariance, by_pairs, heun, innovate
 from .straight import Emitter, total
 
 INPUTS = (*mbbr_header.INPUTS, "straight.py", "packed.py", "filter_header.py", "mbbr_filter.py")
@@ -95,7 +95,7 @@ def predict() -> Emitter:
 
 
 def update() -> Emitter:
-    em = Emitter("k.correct")
+    em = Emitter("k.innovate")
     x = [em.variable(f"x[{i}]") for i in range(N)]
     tx, ty, ex, ey, ez, dtx, dty, dtz, px, py, mx, my, bx, by, scale = x[:15]
     model = ModelRows(mbbr_header.model(), 1)
@@ -139,7 +139,7 @@ def update() -> Emitter:
         expected.append(accel[i] + gravity * x[AT[mount]] + arm * (dtz * dtz))
     rows = [{AT.get(name, name): v for name, v in row.items()} for row in rows]
     residuals = [em.variable(f"y[{i}]") - e for i, e in enumerate(expected)]
-    correct(em, Covariance(em, "P", N), rows, residuals, sums)
+    innovate(em, Covariance(em, "P", N), rows, residuals, sums)
     return em
 
 

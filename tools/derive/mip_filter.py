@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from . import mip_header
 from .filter_header import DT, Filter, ModelRows, add_noise, ahead
-from .packed import Covariance, by_pairs, correct, heun
+from .packed import Covariance, by_pairs, heun, innovate
 from .straight import Emitter
 
 INPUTS = (*mip_header.INPUTS, "straight.py", "packed.py", "filter_header.py", "mip_filter.py")
@@ -61,7 +61,7 @@ def predict() -> Emitter:
 
 
 def update() -> Emitter:
-    em = Emitter("k.correct")
+    em = Emitter("k.innovate")
     x = [em.variable(f"x[{i}]") for i in range(N)]
     th, ph, ps, dth, _, dps = x[:6]
     accel, J = ModelRows(mip_header.model(), 1).evaluate(em, [x[i] for i in MOVED], _felt(em, x))
@@ -115,7 +115,7 @@ def update() -> Emitter:
     ]
     rows = [{AT[name]: v for name, v in row.items()} for row in rows]
     residuals = [em.variable(f"y[{i}]") - e for i, e in enumerate(expected)]
-    correct(em, Covariance(em, "P", N), rows, residuals, {})
+    innovate(em, Covariance(em, "P", N), rows, residuals, {})
     return em
 
 

@@ -171,11 +171,12 @@ class Projected:
         return lambda k: self[k // 2, i][k % 2]
 
 
-def correct(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[Value], sums: dict) -> None:
-    """All measurements, one after the other; what P loses to them, the caller takes off: weight Ph Ph'.
+def innovate(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[Value], sums: dict) -> None:
+    """All measurements, one after the other; the correction is left to the caller: x += step Ph, P -= weight
+    Ph Ph'.
 
-    `sums`: sums of states, by name, that several rows use. Stores x, Ph, and of every row weight, innovation
-    and its square over its variance. A row whose flag is clear has no weight.
+    `sums`: sums of states, by name, that several rows use. A row whose flag is clear has no weight; its
+    innovation and variance are stored all the same.
     """
     n, m, one = P.n, len(rows), emitter.constant(1.0)
     Ph = Projected(emitter, "Ph", n, m)
@@ -194,13 +195,13 @@ def correct(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[V
         columns = {}
         for i, row in enumerate(rows):
             Ph[q, i] = measured(row, lambda k, q=q, known=columns: known.setdefault(k, P.pair(k, q)))
-    weights, innovations, squared = [], [], []
+    weights, innovations = [], []
     for i, row in enumerate(rows):
         Ph.settle()
         # With the rows before it, and its own.
         covariances = [covered(row, Ph.entry(j)) for j in range(i + 1)]
         shares = [c * w for c, w in zip(covariances, weights, strict=False)]
-        variance = covariances[i] + emitter.variable(f"k.R[{i}]", early=True)
+        variance = covariances[i] + emitter.variable(f"R[{i}]")
         innovation = residuals[i]
         for share, c, seen in zip(shares, covariances, innovations, strict=False):
             variance = variance - share * c
@@ -210,19 +211,11 @@ def correct(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[V
             for j, share in enumerate(shares):
                 both = both - share * Ph[q, j]
             Ph[q, i] = both
-        weight = emitter.select(f"use[{i}]", variance.inverse())
-        innovation = emitter.select(f"use[{i}]", innovation)
-        weights.append(weight)
-        innovations.append(innovation)
-        squared.append(innovation * innovation * weight)
-    Ph.settle()
-    steps = [w * v for w, v in zip(weights, innovations, strict=True)]
-    for q in range(n // 2):
-        both = emitter.load(f"x[{2 * q}]", Ph.version)
-        for i, step in enumerate(steps):
-            both = both + step * Ph[q, i]
-        emitter.store(f"x[{2 * q}]", both)
-    for i in range(m):
+        emitter.store(f"row_innovation[{i}]", innovation)
+        emitter.store(f"row_variance[{i}]", variance)
+        weights.append(emitter.select(f"use[{i}]", variance.inverse()))
+        innovations.append(emitter.select(f"use[{i}]", innovation))
+        step = weights[i] * innovations[i]
         emitter.store(f"weight[{i}]", weights[i])
-        emitter.store(f"row_innovation[{i}]", innovations[i])
-        emitter.store(f"row_nis[{i}]", squared[i])
+        emitter.store(f"step[{i}]", step)
+        emitter.store(f"row_nis[{i}]", step * innovations[i])

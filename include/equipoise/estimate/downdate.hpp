@@ -1,5 +1,6 @@
-// What a covariance loses to scalar measurements that were made independent of each other.
-// In: of every row its weight and P h -> P, its upper triangle packed by rows that start at even columns.
+// What scalar measurements that were made independent of each other change: the state and its covariance.
+// In: of every row its step or weight, and P h -> x, P, its upper triangle packed by rows that start at even
+// columns.
 // Two rows of P at once: what is loaded of P h serves both. RT-safe: fixed size.
 #pragma once
 
@@ -12,6 +13,21 @@
 #include "equipoise/estimate/lanes.hpp"
 
 namespace equipoise {
+
+/// x += the sum of step (P h) over m rows.
+template <int n, int m, class Real>
+void correct(const Real* step, const Real* Ph, Real* x) noexcept {
+  using Two = TwoOf<Real>;
+  Two steps[m];
+#pragma GCC unroll 8
+  for (std::size_t i = 0; i < m; ++i) steps[i] = twice(OneOf<Real>(step[i]));
+  for (Real* const end = x + n; x != end; x += 2, Ph += std::ptrdiff_t{2} * m) {
+    Two both = load(x);
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < m; ++i) both = plus(both, steps[i], load(Ph + 2 * i));
+    store(x, both);
+  }
+}
 
 /// P -= the sum of weight (P h) (P h)' over m rows. Ph[n / 2][m][2]: by pairs of states, rows, state of the
 /// pair. The entry that the packing leaves room for in front of odd rows is computed too and means nothing.

@@ -42,6 +42,7 @@ class KalmanFilter {
     normalized_innovation_ = 0.0;
     row_nis_.fill(0.0);
     row_innovation_.fill(0.0);
+    row_variance_.fill(0.0);
   }
 
   void predict(const Vec<p>& u) noexcept {
@@ -62,12 +63,14 @@ class KalmanFilter {
     int used = 0;
     for (int i = 0; i < m; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      row_nis_[row] = row_innovation_[row] = 0.0;
-      if (!use[row]) continue;
       const Vec<n> h = H_.row(i).transpose();
       const Vec<n> Ph = P_ * h;
       const double s = h.dot(Ph) + params_.R(i);
       const double innovation = y(i) - y_hat(i) - h.dot(x_ - x_prior);
+      row_innovation_[row] = innovation;
+      row_variance_[row] = s;
+      row_nis_[row] = 0.0;
+      if (!use[row]) continue;
       const Vec<n> k = Ph / s;
       x_ += k * innovation;
       // (I - k h') P (I - k h')' + k r k', expanded so that every pair (i, j), (j, i) rounds alike: an
@@ -75,7 +78,6 @@ class KalmanFilter {
       for (int j = 0; j < n; ++j) {
         P_.col(j) += (k * k(j)) * s - (k * Ph(j) + Ph * k(j));
       }
-      row_innovation_[row] = innovation;
       row_nis_[row] = innovation * innovation / s;
       nis += row_nis_[row];
       ++used;
@@ -94,8 +96,9 @@ class KalmanFilter {
   double normalized_innovation() const noexcept { return normalized_innovation_; }
   /// Squared innovation over its variance, of each row; 0 where it was not used.
   const std::array<double, m>& row_nis() const noexcept { return row_nis_; }
-  /// In the rows' units.
+  /// Of each row, used or not, given the rows before it that were used; in the rows' units.
   const std::array<double, m>& row_innovation() const noexcept { return row_innovation_; }
+  const std::array<double, m>& row_variance() const noexcept { return row_variance_; }
   const Model& model() const noexcept { return model_; }
 
  private:
@@ -110,6 +113,7 @@ class KalmanFilter {
   double normalized_innovation_ = 0.0;
   std::array<double, m> row_nis_{};
   std::array<double, m> row_innovation_{};
+  std::array<double, m> row_variance_{};
 };
 
 }  // namespace equipoise

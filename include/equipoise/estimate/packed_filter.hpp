@@ -2,7 +2,8 @@
 // a fraction of the instructions, in single or double precision. P is an upper triangle packed by rows, so
 // that it is symmetric by form; its rows start at even columns, so that pairs are aligned. Angles that grow
 // are kept within a few radians, so that single precision resolves them; what is whole in them stands beside.
-// In: input, measurements with a mask of those to use -> state, variances, normalised innovation.
+// Filters that are copies share their constants; one can adopt the state of another for the price of a copy.
+// In: input, measurements with a mask of those to use -> state, variances, innovations and their variances.
 // Source: tools/derive/packed.py; docs/filter.md. RT-safe: fixed size, bounded.
 #pragma once
 
@@ -10,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <variant>
 
 #include "equipoise/estimate/downdate.hpp"
@@ -18,7 +20,7 @@
 
 namespace equipoise {
 
-/// Steps: generated, with Constants, prepare(), predict(), correct(). A Model supplies, beside what
+/// Steps: generated, with Constants, prepare(), predict(), innovate(). A Model supplies, beside what
 /// KalmanFilter asks for, `Steps::Constants<double> constants()` without the noises, `kTurning`, the first of
 /// `kTurnings` angles that its motion does not depend on, and `turning_rows()`, how the samples do.
 template <class Model, class Steps>
@@ -42,13 +44,13 @@ class PackedFilter {
     for (const auto& [state, input] : Steps::kB) k.B[place++] = B(state, input);
     place = 0;
     for (const auto& [row, column] : Steps::kQ) k.Q[place++] = Q(row, column);
-    Eigen::Map<Vec<m>>(k.R) = params.R;
     Steps::prepare(k);
     if (precision == Precision::kSingle) {
-      core_ = Core<float>{rounded(k), {}, {}};
+      core_ = Core<float>{std::make_shared<const Constants<float>>(rounded(k))};
     } else {
-      core_ = Core<double>{k, {}, {}};
+      core_ = Core<double>{std::make_shared<const Constants<double>>(k)};
     }
+    for (int i = 0; i < m; ++i) set_row_noise(static_cast<std::size_t>(i), params.R(i));
     reset(Vec<n>::Zero());
   }
 
@@ -64,6 +66,27 @@ class PackedFilter {
     normalized_innovation_ = 0.0;
     row_nis_.fill(0.0);
     row_innovation_.fill(0.0);
+    row_variance_.fill(0.0);
+  }
+
+  /// State, variances and innovations of `other`, in whichever precision; constants and noise stay this
+  /// one's.
+  void adopt(const PackedFilter& other) noexcept {
+    on_core(core_, [&](auto& core) {
+      on_core(other.core_, [&](const auto& from) {
+        using Real = RealOf<decltype(core)>;
+        const auto to_real = [](auto v) { return static_cast<Real>(v); };
+        std::transform(from.x.begin(), from.x.end(), core.x.begin(), to_real);
+        std::transform(from.P.begin(), from.P.end(), core.P.begin(), to_real);
+      });
+    });
+    x_ = other.x_;
+    whole_ = other.whole_;
+    expected_whole_ = other.expected_whole_;
+    normalized_innovation_ = other.normalized_innovation_;
+    row_nis_ = other.row_nis_;
+    row_innovation_ = other.row_innovation_;
+    row_variance_ = other.row_variance_;
   }
 
   /// The motion's states `x` after dt, with what acts, input and disturbance.
@@ -74,7 +97,7 @@ class PackedFilter {
       using Real = RealOf<decltype(core)>;
       const Vector<Real, p> acts(u);
       Vector<Real, kMotion> moved(x);
-      Steps::ahead(core.k, acts.data(), static_cast<Real>(dt), moved.data());
+      Steps::ahead(*core.k, acts.data(), static_cast<Real>(dt), moved.data());
       moved.copy_to(x);
     });
     x.template segment<Model::kTurnings>(Model::kTurning) += from;
@@ -83,13 +106,19 @@ class PackedFilter {
   void predict(const Vec<p>& u) noexcept {
     on_core(core_, [&](auto& core) {
       const Vector<RealOf<decltype(core)>, p> acts(u);
-      Steps::predict(core.k, acts.data(), core.x.data(), core.P.data() + Steps::kMiddleP);
+      Steps::predict(*core.k, acts.data(), core.x.data(), core.P.data() + Steps::kMiddleP);
       show(core);
     });
   }
 
   void update(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
-    on_core(core_, [&](auto& core) { update(core, u, y, use); });
+    innovate(u, y, use);
+    correct();
+  }
+
+  /// Innovations of the samples and their variances; the state stays as predicted.
+  void innovate(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
+    on_core(core_, [&](auto& core) { innovate(core, u, y, use); });
     double nis = 0.0;
     int used = 0;
     for (std::size_t i = 0; i < m; ++i) {
@@ -97,6 +126,16 @@ class PackedFilter {
       used += use[i] ? 1 : 0;
     }
     normalized_innovation_ = used > 0 ? nis / used : 0.0;
+  }
+
+  /// By the samples that innovate() was given last, nothing having happened since.
+  void correct() noexcept {
+    on_core(core_, [&](auto& core) {
+      equipoise::correct<n, m>(core.step, core.Ph, core.x.data());
+      downdate<n, m>(core.weight, core.Ph, core.P.data());
+      keep_small(core);
+      show(core);
+    });
   }
 
   /// Adds to the variances of `count` states from `first` on.
@@ -116,8 +155,16 @@ class PackedFilter {
   double normalized_innovation() const noexcept { return normalized_innovation_; }
   /// Squared innovation over its variance, of each row; 0 where it was not used.
   const std::array<double, m>& row_nis() const noexcept { return row_nis_; }
-  /// In the rows' units.
+  /// Of each row, used or not, given the rows before it that were used; in the rows' units.
   const std::array<double, m>& row_innovation() const noexcept { return row_innovation_; }
+  const std::array<double, m>& row_variance() const noexcept { return row_variance_; }
+  /// Variance of a row's sensor.
+  double row_noise(std::size_t row) const noexcept {
+    return on_core(core_, [&](const auto& core) { return static_cast<double>(core.R[row]); });
+  }
+  void set_row_noise(std::size_t row, double variance) noexcept {
+    on_core(core_, [&](auto& core) { core.R[row] = static_cast<RealOf<decltype(core)>>(variance); });
+  }
 
  private:
   template <class Real>
@@ -127,9 +174,14 @@ class PackedFilter {
   template <class Real>
   struct Core {
     using Number = Real;
-    Constants<Real> k;
-    alignas(16) std::array<Real, n> x;
-    alignas(16) std::array<Real, static_cast<std::size_t>(Steps::kTriangle)> P;
+    std::shared_ptr<const Constants<Real>> k;
+    alignas(16) std::array<Real, n> x{};
+    alignas(16) std::array<Real, static_cast<std::size_t>(Steps::kTriangle)> P{};
+    std::array<Real, m> R{};
+    // Of innovate(), for correct():
+    alignas(16) Real Ph[n * m]{};
+    Real weight[m]{};
+    Real step[m]{};
   };
   template <class C>
   using RealOf = typename std::decay_t<C>::Number;
@@ -177,22 +229,20 @@ class PackedFilter {
   }
 
   template <class Real>
-  void update(Core<Real>& core, const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
-    alignas(16) Real Ph[n * m];
-    Real weight[m];
+  void innovate(Core<Real>& core, const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
     Real innovation[m];
+    Real variance[m];
     Real nis[m];
     const Vector<Real, p> acts(u);
     const Vector<Real, m> seen(y - expected_whole_);
-    Steps::correct(core.k, acts.data(), seen.data(), use.data(), core.x.data(),
-                   core.P.data() + Steps::kMiddleP, Ph + Steps::kMiddlePh, weight, innovation, nis);
-    downdate<n, m>(weight, Ph, core.P.data());
+    Steps::innovate(*core.k, acts.data(), seen.data(), use.data(), core.R.data(), core.x.data(),
+                    core.P.data() + Steps::kMiddleP, core.Ph + Steps::kMiddlePh, core.weight, core.step,
+                    innovation, variance, nis);
     for (std::size_t i = 0; i < m; ++i) {
       row_innovation_[i] = static_cast<double>(innovation[i]);
+      row_variance_[i] = static_cast<double>(variance[i]);
       row_nis_[i] = static_cast<double>(nis[i]);
     }
-    keep_small(core);
-    show(core);
   }
 
   template <class Real>
@@ -239,6 +289,7 @@ class PackedFilter {
   double normalized_innovation_ = 0.0;
   std::array<double, m> row_nis_{};
   std::array<double, m> row_innovation_{};
+  std::array<double, m> row_variance_{};
 };
 
 }  // namespace equipoise

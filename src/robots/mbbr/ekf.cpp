@@ -176,7 +176,16 @@ void MbbrEkf::predict(const Vec3& u) noexcept {
   direction_ = Turn(heading_);
 }
 
-void MbbrEkf::update(const Mbbr::Sample& z) noexcept {
+void MbbrEkf::adopt(const MbbrEkf& other) noexcept {
+  filter_.adopt(other.filter_);
+  time_ = other.time_;
+  gyro_bias_z_ = other.gyro_bias_z_;
+  heading_ = other.heading_;
+  direction_ = other.direction_;
+  phi_ = other.phi_;
+}
+
+void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
   Mbbr::Sample::WheelFlags wheel = z.wheel_ok;
   for (bool& ok : wheel) ok = ok && z.encoders_ok;
   time_.observe(z.wheel_angle_rad, wheel);
@@ -187,8 +196,8 @@ void MbbrEkf::update(const Mbbr::Sample& z) noexcept {
   y.segment<2>(Model::kAccel) = z.accel_B_m_s2.head<2>();
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
-  filter_.update(time_.acted(), y,
-                 {imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], wheel[2], imu, imu});
+  filter_.innovate(time_.acted(), y,
+                   {imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], wheel[2], imu, imu});
 }
 
 Vec3 MbbrEkf::wheel_rate_rad_s() const noexcept {

@@ -86,7 +86,16 @@ class MbbrEkf {
   /// A tick without samples; `u` acted in it.
   void predict(const Vec3& u) noexcept;
   /// The samples at the end of the predicted tick.
-  void update(const Mbbr::Sample& z) noexcept;
+  void update(const Mbbr::Sample& z) noexcept {
+    innovate(z);
+    correct();
+  }
+  /// The first half of update(): innovations and their variances, the state as predicted.
+  void innovate(const Mbbr::Sample& z) noexcept;
+  /// The second half.
+  void correct() noexcept { filter_.correct(); }
+  /// The state of another filter, with this one's noise: a copy of x and P, without constants.
+  void adopt(const MbbrEkf& other) noexcept;
 
   /// Now, that is `sensor_age_s` after the filter's own state.
   MbbrEstimate estimate() const noexcept;
@@ -100,6 +109,9 @@ class MbbrEkf {
   /// gyro x, y, z, wheels, accelerometer x, y: squared innovation over its variance; 0 where not used.
   const std::array<double, 8>& row_nis() const noexcept { return filter_.row_nis(); }
   const std::array<double, 8>& row_innovation() const noexcept { return filter_.row_innovation(); }
+  const std::array<double, 8>& row_variance() const noexcept { return filter_.row_variance(); }
+  double row_noise(std::size_t row) const noexcept { return filter_.row_noise(row); }
+  void set_row_noise(std::size_t row, double variance) noexcept { filter_.set_row_noise(row, variance); }
   double tilt_sigma_rad() const noexcept {
     return std::sqrt(filter_.variance(Model::kThetaX) + filter_.variance(Model::kThetaY));
   }

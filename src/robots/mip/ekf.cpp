@@ -215,7 +215,16 @@ void MipEkf::predict(const Vec2& u) noexcept {
   heading_ += 0.5 * kTickS * (before + x()(Model::kPsiDot));
 }
 
-void MipEkf::update(const Mip::Sample& z) noexcept {
+void MipEkf::adopt(const MipEkf& other) noexcept {
+  filter_.adopt(other.filter_);
+  time_ = other.time_;
+  gyro_bias_yz_ = other.gyro_bias_yz_;
+  heading_ = other.heading_;
+  settling_ = other.settling_;
+  without_y_ = other.without_y_;
+}
+
+void MipEkf::innovate(const Mip::Sample& z) noexcept {
   Mip::Sample::WheelFlags wheel = z.wheel_ok;
   for (bool& ok : wheel) ok = ok && z.encoders_ok;
   time_.observe(z.wheel_angle_rad, wheel);
@@ -227,7 +236,7 @@ void MipEkf::update(const Mip::Sample& z) noexcept {
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
   without_y_ = filter_.row_nis()[Model::kGyro + 1] > kOddNis ? kWithoutTicks : std::max(without_y_ - 1, 0);
-  filter_.update(
+  filter_.innovate(
       time_.acted(), y,
       {imu && axis[0], imu && axis[1] && without_y_ == 0, imu && axis[2], wheel[0], wheel[1], imu});
 }

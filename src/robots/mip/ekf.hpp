@@ -93,7 +93,16 @@ class MipEkf {
   /// A tick without samples; `u` acted in it.
   void predict(const Vec2& u) noexcept;
   /// The samples at the end of the predicted tick.
-  void update(const Mip::Sample& z) noexcept;
+  void update(const Mip::Sample& z) noexcept {
+    innovate(z);
+    correct();
+  }
+  /// The first half of update(): innovations and their variances, the state as predicted.
+  void innovate(const Mip::Sample& z) noexcept;
+  /// The second half.
+  void correct() noexcept { filter_.correct(); }
+  /// The state of another filter, with this one's noise: a copy of x and P, without constants.
+  void adopt(const MipEkf& other) noexcept;
 
   /// Now, that is `sensor_age_s` after the filter's own state; without a position.
   MipEstimate estimate() const noexcept;
@@ -109,6 +118,9 @@ class MipEkf {
   /// gyro x, y, z, wheels, accelerometer y: squared innovation over its variance; 0 where not used.
   const std::array<double, 6>& row_nis() const noexcept { return filter_.row_nis(); }
   const std::array<double, 6>& row_innovation() const noexcept { return filter_.row_innovation(); }
+  const std::array<double, 6>& row_variance() const noexcept { return filter_.row_variance(); }
+  double row_noise(std::size_t row) const noexcept { return filter_.row_noise(row); }
+  void set_row_noise(std::size_t row, double variance) noexcept { filter_.set_row_noise(row, variance); }
   double tilt_sigma_rad() const noexcept { return std::sqrt(filter_.variance(Model::kTheta)); }
 
  private:

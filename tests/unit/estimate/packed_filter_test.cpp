@@ -92,7 +92,9 @@ class PackedFilterTest : public ::testing::Test {
     for (std::size_t i = 0; i < m; ++i) {
       const double nis = dense_.row_nis()[i];
       worst = std::max(worst, std::abs(packed_.row_nis()[i] - nis) / std::max(1.0, nis));
+      if (std::isnan(dense_.row_innovation()[i])) continue;  // of a sample that does not count
       worst = std::max(worst, std::abs(packed_.row_innovation()[i] - dense_.row_innovation()[i]));
+      worst = std::max(worst, std::abs(packed_.row_variance()[i] / dense_.row_variance()[i] - 1.0));
     }
     return worst;
   }
@@ -198,6 +200,89 @@ TYPED_TEST(PackedFilterTest, InSinglePrecisionStaysWithinAFractionOfSigma) {
   }
   EXPECT_NE(single.x(), reference.x());  // it is single
   std::printf("%ld steps: %.1e sigma\n", end, worst);
+}
+
+/// With S = H P H' + R of the rows that count: the rows' variances have the product det S, the squared
+/// innovations the sum nu' S^-1 nu (Kay, Fundamentals of Statistical Signal Processing I, 12.6).
+TYPED_TEST(PackedFilterTest, GivesTheLikelihoodOfTheSamplesBeforeItCorrects) {
+  constexpr int kStates = TestFixture::n;
+  constexpr int kRows = TestFixture::m;
+  constexpr int kUsed = kRows - 1;
+  auto& filter = this->packed_;
+  filter.reset(TypeParam::truth(0.0));
+  const Vec<TestFixture::p> u = Vec<TestFixture::p>::Constant(0.1);
+  for (int k = 0; k < 20; ++k) filter.predict(u);
+  for (std::size_t i = 0; i < kRows; ++i)
+    filter.set_row_noise(i, (2.0 + static_cast<double>(i)) * filter.row_noise(i));
+  Vec<kRows> expected;
+  Mat<kRows, kStates> H;
+  this->model_.measure(filter.x(), u, expected, H);
+  const Vec<kRows> nu = 0.05 * Vec<kRows>::LinSpaced(-1.0, 2.0);
+  const Vec<kStates> x = filter.x();
+  const Mat<kStates, kStates> P = filter.P();
+  const Vec<kRows> R = this->robot_.params.R.cwiseProduct(Vec<kRows>::LinSpaced(2.0, kRows + 1.0));
+  std::array<bool, kRows> use = all_true<kRows>();
+  use[kUsed] = false;
+  filter.innovate(u, expected + nu, use);
+  EXPECT_EQ(filter.x(), x);
+  EXPECT_EQ(filter.P(), P);
+
+  Mat<kRows, kRows> S = H * P * H.transpose();
+  S.diagonal() += R;
+  const Eigen::Matrix<double, kUsed, kUsed> of_used = S.template topLeftCorner<kUsed, kUsed>();
+  const Vec<kUsed> weighted = of_used.ldlt().solve(nu.template head<kUsed>());
+  double product = 1.0;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kUsed; ++i) {
+    product *= filter.row_variance()[i];
+    sum += filter.row_innovation()[i] * filter.row_innovation()[i] / filter.row_variance()[i];
+  }
+  EXPECT_NEAR(product / of_used.determinant(), 1.0, 1e-9);
+  EXPECT_NEAR(sum / nu.template head<kUsed>().dot(weighted), 1.0, 1e-9);
+  // The row that does not count: what the others leave open of it.
+  const Vec<kUsed> across = S.template topRightCorner<kUsed, 1>();
+  EXPECT_NEAR(filter.row_innovation()[kUsed], nu(kUsed) - across.dot(weighted), 1e-9);
+  EXPECT_NEAR(filter.row_variance()[kUsed] / (S(kUsed, kUsed) - across.dot(of_used.ldlt().solve(across))),
+              1.0, 1e-9);
+  filter.correct();
+  const Vec<kStates> gained = P * H.template topRows<kUsed>().transpose() * weighted;
+  EXPECT_LT((filter.x() - x - gained).norm(), 1e-9 * gained.norm());
+}
+
+TYPED_TEST(PackedFilterTest, AdoptsTheStateOfAnotherWithItsOwnNoise) {
+  const Vec<TestFixture::p> u = Vec<TestFixture::p>::Constant(0.1);
+  const Vec<TestFixture::m> y = Vec<TestFixture::m>::Constant(0.01);
+  constexpr auto all = all_true<TestFixture::m>();
+  for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
+    typename TestFixture::Packed filter(this->model_, this->robot_.params, precision);
+    typename TestFixture::Packed fork = filter;
+    filter.reset(TypeParam::truth(3000.0));  // angles of which whole turns were taken off
+    for (int k = 0; k < 50; ++k) {
+      filter.predict(u);
+      filter.update(u, y, all);
+      fork.predict(-u);
+    }
+    fork.adopt(filter);
+    EXPECT_EQ(fork.row_variance(), filter.row_variance());
+    for (auto* both : {&filter, &fork}) {
+      both->predict(u);
+      both->update(u, y, all);
+    }
+    EXPECT_EQ(fork.x(), filter.x());
+    EXPECT_EQ(fork.P(), filter.P());
+    fork.set_row_noise(0, 4.0 * filter.row_noise(0));
+    fork.adopt(filter);
+    for (auto* both : {&filter, &fork}) both->innovate(u, y, all);
+    EXPECT_NEAR(fork.row_variance()[0] - filter.row_variance()[0], 3.0 * filter.row_noise(0),
+                1e-5 * filter.row_variance()[0]);
+    // In the other precision, to its last digit.
+    typename TestFixture::Packed other(
+        this->model_, this->robot_.params,
+        precision == Precision::kSingle ? Precision::kDouble : Precision::kSingle);
+    other.adopt(filter);
+    EXPECT_LT((other.x() - filter.x()).cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_NEAR(other.variance(0) / filter.variance(0), 1.0, 1e-6);
+  }
 }
 
 TYPED_TEST(PackedFilterTest, HoldsEveryEntryOfTheProcessNoise) {
