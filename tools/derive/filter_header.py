@@ -77,6 +77,8 @@ class Filter:
     ahead: Emitter
     predict: Emitter
     innovate: Emitter
+    restore: Emitter
+    precise: dict[int, tuple[int, list[int]]]  # row -> state that it all but measures, its columns
     scripts: tuple[str, ...]  # which it comes from
 
     @property
@@ -116,7 +118,7 @@ def _places(name: str, about: str, places) -> list[str]:
 
 def _kept(filter: Filter) -> list[str]:
     lines = ["    // By prepare():"]
-    for name in ("ahead", "predict", "innovate"):
+    for name in _steps(filter):
         code = getattr(filter, name).lines()
         if code.pairs:
             lines.append(f"    alignas(2 * sizeof(Real)) Real {name}_pairs[{2 * code.pairs}];")
@@ -136,10 +138,13 @@ def _file(filter: Filter, suffix: str, about: list[str], includes: list[str], bo
 def _steps(filter: Filter) -> dict[str, list[tuple[str, str]]]:
     """Of every step, what it takes: type and name."""
     n, m, p = len(filter.states), filter.outputs, filter.inputs
+    k, entries = len(filter.precise), sum(len(columns) for _, columns in filter.precise.values())
+    constants = ("const Constants<Real>&", "k")
     return {
-        "ahead": [("const Real", f"u[{p}]"), ("Real", "dt"), ("Real", f"x[{filter.motion}]")],
-        "predict": [("const Real", f"u[{p}]"), ("Real", f"x[{n}]"), ("Real*", "P")],
+        "ahead": [constants, ("const Real", f"u[{p}]"), ("Real", "dt"), ("Real", f"x[{filter.motion}]")],
+        "predict": [constants, ("const Real", f"u[{p}]"), ("Real", f"x[{n}]"), ("Real*", "P")],
         "innovate": [
+            constants,
             ("const Real", f"u[{p}]"),
             ("const Real", f"y[{m}]"),
             ("const bool", f"use[{m}]"),
@@ -152,18 +157,27 @@ def _steps(filter: Filter) -> dict[str, list[tuple[str, str]]]:
             ("Real", f"row_innovation[{m}]"),
             ("Real", f"row_variance[{m}]"),
             ("Real", f"row_nis[{m}]"),
+            ("Real", f"h[{entries}]"),
+            ("Real", f"gain[{k * m}]"),
+        ],
+        "restore": [
+            ("const bool", f"use[{k}]"),
+            ("const Real", f"h[{entries}]"),
+            ("const Real", f"exact[{k * n}]"),
+            ("Real*", "P"),
         ],
     }
 
 
 def _declaration(name: str, takes: list[tuple[str, str]], real: str, indent: int = 2) -> list[str]:
-    takes = [("const Constants<Real>&", "k"), *takes]
     text = ", ".join(f"{kind} {what}".replace("Real", real) for kind, what in takes)
     return emit.statement(f"void {name}({text}) noexcept", indent)
 
 
 def render(filter: Filter) -> str:
     n, m, p = len(filter.states), filter.outputs, filter.inputs
+    precise = [(i, state) for i, (state, _) in filter.precise.items()]
+    entries = sum(len(columns) for _, columns in filter.precise.values())
     name = filter.robot.capitalize()
     about = {
         "ahead": ["x after dt with what acts, input and disturbance."],
@@ -172,7 +186,11 @@ def render(filter: Filter) -> str:
             "What the samples y with variances R change, if their flag is set: x gains the sum of",
             "step Ph over the rows, P loses that of weight Ph Ph'. Innovation and variance of a row: given",
             "the rows before it whose flag is set. weight, step, row_nis: 0 where the flag is clear.",
-            f"Ph[{n // 2}][{m}][2]: pairs of states, rows, state of the pair.",
+            f"Ph[{n // 2}][{m}][2]: pairs of states, rows, state of the pair. h, gain: for restore().",
+        ],
+        "restore": [
+            "Rows of P whose digits the correction lost: kPrecise, of those whose flag is set. exact: the",
+            "sum of gain Ph over the rows.",
         ],
     }
     steps: list[str] = []
@@ -195,6 +213,8 @@ def render(filter: Filter) -> str:
         f"  static constexpr double kTickS = {DT};",
         *_places("kB", "Entries of B: state, input", filter.B),
         *_places("kQ", "Entries of Q: row, column", filter.noise),
+        *_places("kPrecise", "Row, and the state that it all but measures", precise),
+        f"  static constexpr int kEntries = {entries};  // of those rows",
         "",
         "  /// Nothing but numbers, all of one type.",
         "  template <class Real>",
@@ -219,7 +239,7 @@ def render(filter: Filter) -> str:
 
 def render_code(filter: Filter) -> str:
     name = filter.robot.capitalize() + "Filter"
-    lines = {step: getattr(filter, step).lines() for step in ("ahead", "predict", "innovate")}
+    lines = {step: getattr(filter, step).lines() for step in _steps(filter)}
     early = [line for code in lines.values() for line in ("  {", *code.early, "  }") if code.early]
     body = [
         "template <class Real>",
@@ -237,7 +257,7 @@ def render_code(filter: Filter) -> str:
         body += [line for text in declaration for line in emit.statement(text, 0)]
         body[-1] += " {"
         body += ["  using One = OneOf<Real>;", "  using Two = TwoOf<Real>;", *lines[step].late, "}", ""]
-        names = ", ".join(["k", *(what.partition("[")[0] for _, what in takes)])
+        names = ", ".join(what.partition("[")[0] for _, what in takes)
         for real in ("double", "float"):
             body += ["EQUIPOISE_AVX512_TOO", *_declaration(f"{name}::{step}", takes, real, indent=0)]
             body[-1] += " {"

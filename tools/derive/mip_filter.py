@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from . import mip_header
 from .filter_header import DT, Filter, ModelRows, add_noise, ahead
-from .packed import Covariance, by_pairs, heun, innovate
+from .packed import Covariance, by_pairs, heun, innovate, restore
 from .straight import Emitter
 
 INPUTS = (*mip_header.INPUTS, "straight.py", "packed.py", "filter_header.py", "mip_filter.py")
@@ -15,6 +15,11 @@ STATES = ["th", "ph", "ps", "dth", "dph", "dps", "mx", "my", "mz", "bias", "arm"
 AT = {name: i for i, name in enumerate(STATES)}
 N = len(STATES)
 MOVED = [AT[s] for s in ("th", "dth", "dph", "dps")]
+# Torque noise of a tick moves tilt and yaw rate by 0.13 rad/s, the gyro knows them to 0.001.
+PRECISE = {
+    0: (AT["dth"], [AT[s] for s in ("th", "dth", "bias", "dps", "mz", "my")]),
+    2: (AT["dps"], [AT[s] for s in ("th", "dps", "dth", "mx", "my")]),
+}
 B = [(AT[s], i) for i, states in enumerate((("th", "ph", "dth", "dph"), ("ps", "dps"))) for s in states]
 
 
@@ -115,7 +120,13 @@ def update() -> Emitter:
     ]
     rows = [{AT[name]: v for name, v in row.items()} for row in rows]
     residuals = [em.variable(f"y[{i}]") - e for i, e in enumerate(expected)]
-    innovate(em, Covariance(em, "P", N), rows, residuals, {})
+    innovate(em, Covariance(em, "P", N), rows, residuals, {}, PRECISE)
+    return em
+
+
+def _restore() -> Emitter:
+    em = Emitter("k.restore")
+    restore(em, Covariance(em, "P", N), PRECISE)
     return em
 
 
@@ -129,5 +140,5 @@ def made() -> Filter:
         "Real g;",
         "Real keep;  // of the disturbance, per tick",
     ]
-    steps = (ahead(_derivative, 6, 2), predict(), update())
-    return Filter("mip", STATES, 6, 2, 6, B, constants, *steps, INPUTS)
+    steps = (ahead(_derivative, 6, 2), predict(), update(), _restore())
+    return Filter("mip", STATES, 6, 2, 6, B, constants, *steps, PRECISE, INPUTS)

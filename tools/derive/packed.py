@@ -171,12 +171,14 @@ class Projected:
         return lambda k: self[k // 2, i][k % 2]
 
 
-def innovate(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[Value], sums: dict) -> None:
+def innovate(
+    emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[Value], sums: dict, precise: dict
+) -> None:
     """All measurements, one after the other; the correction is left to the caller: x += step Ph, P -= weight
     Ph Ph'.
 
     `sums`: sums of states, by name, that several rows use. A row whose flag is clear has no weight; its
-    innovation and variance are stored all the same.
+    innovation and variance are stored all the same. `precise`: for restore().
     """
     n, m, one = P.n, len(rows), emitter.constant(1.0)
     Ph = Projected(emitter, "Ph", n, m)
@@ -195,12 +197,13 @@ def innovate(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[
         columns = {}
         for i, row in enumerate(rows):
             Ph[q, i] = measured(row, lambda k, q=q, known=columns: known.setdefault(k, P.pair(k, q)))
-    weights, innovations = [], []
+    weights, innovations, all_shares = [], [], []
     for i, row in enumerate(rows):
         Ph.settle()
         # With the rows before it, and its own.
         covariances = [covered(row, Ph.entry(j)) for j in range(i + 1)]
         shares = [c * w for c, w in zip(covariances, weights, strict=False)]
+        all_shares.append(shares)
         variance = covariances[i] + emitter.variable(f"R[{i}]")
         innovation = residuals[i]
         for share, c, seen in zip(shares, covariances, innovations, strict=False):
@@ -219,3 +222,49 @@ def innovate(emitter: Emitter, P: Covariance, rows: list[dict], residuals: list[
         emitter.store(f"weight[{i}]", weights[i])
         emitter.store(f"step[{i}]", step)
         emitter.store(f"row_nis[{i}]", step * innovations[i])
+    place = 0
+    for i, (_, columns) in precise.items():
+        for k in sorted(columns):
+            emitter.store(f"h[{place}]", rows[i].pop(k))
+            place += 1
+        if rows[i]:
+            raise ValueError(f"row {i} has more columns: {rows[i]}")
+    for place, i in enumerate(precise):
+        part = {i: one}  # of the row's innovation in that of each later row
+        for j in range(i + 1, m):
+            part[j] = -total(all_shares[j][k] * part[k] for k in range(i, j))
+        for j in range(i, m):
+            emitter.store(f"gain[{place * m + j}]", emitter.variable(f"R[{i}]") * weights[j] * part[j])
+
+
+def restore(emitter: Emitter, P: Covariance, precise: dict[int, tuple[int, list[int]]]) -> None:
+    """Digits of P that innovate()'s correction has lost: of a state that a row all but measures by itself, P
+    falls by decades in every tick, as the difference of numbers that are nearly equal.
+
+    `precise`: row -> that state, and the row's columns. Once all rows are in, P h = R K (`exact`), K the
+    row's column of the gain, where nothing cancels; without the other columns' part it is the state's row.
+    """
+    n, one = P.n, emitter.constant(1.0)
+    place = 0
+    for order, (state, columns) in enumerate(precise.values()):
+        h = {k: emitter.variable(f"h[{place + i}]") for i, k in enumerate(sorted(columns))}
+        place += len(columns)
+        flag, scale = emitter.select(f"use[{order}]", one), h[state].inverse()
+
+        def restored(exact, entry, old, h=h, state=state, flag=flag, scale=scale):
+            for k in sorted(h.keys() - {state}):
+                exact = exact - h[k] * entry(k)
+            return old + flag * (exact * scale - old)
+
+        new: dict[int, Value] = {}
+        for q in range(n // 2):
+            exact = emitter.load(f"exact[{order * n + 2 * q}]")
+            both = restored(exact, lambda k, q=q: P.pair(k, q), P.pair(state, q))
+            new[2 * q], new[2 * q + 1] = both[0], both[1]
+        old = P[state, state]
+        for j in range(n):
+            if j != state:
+                P[state, j] = new[j]
+        exact = emitter.load(f"exact[{order * n + state}]", pair=False)
+        P[state, state] = restored(exact, lambda k, state=state: P[k, state], old)
+        P.store()

@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <variant>
 
@@ -32,6 +33,7 @@ class PackedFilter {
   static constexpr int kMotion = Steps::kMotion;  // states that move, the first
   static_assert(Steps::kStates == n && Steps::kOutputs == m && Steps::kInputs == p && n % 2 == 0);
   static_assert(Steps::kTickS == kTickS);
+  static constexpr int kPrecise = static_cast<int>(std::size(Steps::kPrecise));
   using Params = typename KalmanFilter<Model>::Params;
 
   PackedFilter(const Model& model, const Params& params, Precision precision = Precision::kDouble)
@@ -133,6 +135,7 @@ class PackedFilter {
     on_core(core_, [&](auto& core) {
       equipoise::correct<n, m>(core.step, core.Ph, core.x.data());
       downdate<n, m>(core.weight, core.Ph, core.P.data());
+      restore(core);
       keep_small(core);
       show(core);
     });
@@ -182,6 +185,8 @@ class PackedFilter {
     alignas(16) Real Ph[n * m]{};
     Real weight[m]{};
     Real step[m]{};
+    Real h[Steps::kEntries]{};
+    Real gain[kPrecise * m]{};
   };
   template <class C>
   using RealOf = typename std::decay_t<C>::Number;
@@ -237,12 +242,23 @@ class PackedFilter {
     const Vector<Real, m> seen(y - expected_whole_);
     Steps::innovate(*core.k, acts.data(), seen.data(), use.data(), core.R.data(), core.x.data(),
                     core.P.data() + Steps::kMiddleP, core.Ph + Steps::kMiddlePh, core.weight, core.step,
-                    innovation, variance, nis);
+                    innovation, variance, nis, core.h, core.gain);
     for (std::size_t i = 0; i < m; ++i) {
       row_innovation_[i] = static_cast<double>(innovation[i]);
       row_variance_[i] = static_cast<double>(variance[i]);
       row_nis_[i] = static_cast<double>(nis[i]);
     }
+  }
+
+  template <class Real>
+  static void restore(Core<Real>& core) noexcept {
+    alignas(16) Real exact[kPrecise * n]{};
+    bool use[kPrecise];
+    for (int i = 0; i < kPrecise; ++i) {
+      use[i] = core.weight[Steps::kPrecise[i][0]] != Real{0};
+      equipoise::correct<n, m>(core.gain + i * m, core.Ph, exact + i * n);
+    }
+    Steps::restore(use, core.h, exact, core.P.data() + Steps::kMiddleP);
   }
 
   template <class Real>

@@ -194,7 +194,7 @@ TYPED_TEST(PackedFilterTest, InSinglePrecisionStaysWithinAFractionOfSigma) {
     for (int i = 0; i < TestFixture::n; ++i) {
       const double one_sigma = std::sqrt(reference.variance(i));
       worst = std::max(worst, std::abs(single.x()(i) - reference.x()(i)) / one_sigma);
-      ASSERT_NEAR(std::sqrt(single.variance(i)), one_sigma, 0.01 * one_sigma) << k << " state " << i;
+      ASSERT_NEAR(std::sqrt(single.variance(i)), one_sigma, 0.003 * one_sigma) << k << " state " << i;
     }
     ASSERT_LT(worst, 0.1) << k;
   }
