@@ -84,17 +84,18 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     return reference_.update(command, x_hat);
   }
 
-  /// The model runs on through missed ticks, bounded by Freshness::kMaxTicks. The bridges held the last
-  /// command until the guard let go, if it did; then the motors coasted.
+  /// The model runs on through missed ticks. The bridges held the last command until the guard let go, if it
+  /// did; then the motors coasted. A stall that safety will not ride through is not worth the time.
   void bridge_gap(const typename Robot::Sample& z, std::uint32_t inhibit) noexcept {
-    if (held_ || z.ticks <= 1) return;
+    const bool overrun = (inhibit & kOverrun) != 0;
+    if (held_ || (overrun && (z.ticks > p_.safety.max_stalled_ticks || !health_.predicts_wheels))) return;
     typename Robot::Sample nothing = z;
     nothing.imu_ok = nothing.encoders_ok = nothing.attitude_ok = false;
     for (int missed = 1; missed < z.ticks; ++missed) {
       estimators_.update(nothing, u_previous_, false);
-      if ((inhibit & kOverrun) == 0 || missed < kGuardTicks) continue;
+      if (!overrun || missed < kGuardTicks) continue;
       health_ = estimators_.health();
-      u_previous_ = coasting(health_.predicts_wheels ? health_.wheel_rate_rad_s : z.wheel_rate_rad_s);
+      u_previous_ = coasting(health_.wheel_rate_rad_s);
     }
   }
 

@@ -130,6 +130,13 @@ class PackedFilter {
     normalized_innovation_ = used > 0 ? nis / used : 0.0;
   }
 
+  /// Of a tick without samples there is nothing to correct.
+  void miss() noexcept {
+    row_nis_.fill(0.0);
+    row_innovation_.fill(0.0);
+    normalized_innovation_ = 0.0;
+  }
+
   /// By the samples that innovate() was given last, nothing having happened since.
   void correct() noexcept {
     on_core(core_, [&](auto& core) {

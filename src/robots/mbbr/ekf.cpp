@@ -185,6 +185,11 @@ void MbbrEkf::adopt(const MbbrEkf& other) noexcept {
   phi_ = other.phi_;
 }
 
+void MbbrEkf::miss(const Mbbr::Sample& z) noexcept {
+  time_.observe(z.wheel_angle_rad, {});
+  filter_.miss();
+}
+
 void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
   Mbbr::Sample::WheelFlags wheel = z.wheel_ok;
   for (bool& ok : wheel) ok = ok && z.encoders_ok;

@@ -85,8 +85,10 @@ class MbbrEkf {
   void start_moving(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Mbbr::Sample& z) noexcept;
   /// A tick without samples; `u` acted in it.
   void predict(const Vec3& u) noexcept;
-  /// The samples at the end of the predicted tick.
+  /// The samples at the end of the predicted tick. Without any there is nothing to correct: a loop that was
+  /// late catches up by predictions.
   void update(const Mbbr::Sample& z) noexcept {
+    if (!z.imu_ok && !z.encoders_ok) return miss(z);
     innovate(z);
     correct();
   }
@@ -117,6 +119,8 @@ class MbbrEkf {
   }
 
  private:
+  void miss(const Mbbr::Sample& z) noexcept;
+
   Params params_;
   MbbrKinematics kinematics_;
   Filter filter_;

@@ -224,6 +224,17 @@ void MipEkf::adopt(const MipEkf& other) noexcept {
   without_y_ = other.without_y_;
 }
 
+/// The gyro's y is not used for a while after it was odd.
+void MipEkf::judge_y() noexcept {
+  without_y_ = filter_.row_nis()[Model::kGyro + 1] > kOddNis ? kWithoutTicks : std::max(without_y_ - 1, 0);
+}
+
+void MipEkf::miss(const Mip::Sample& z) noexcept {
+  time_.observe(z.wheel_angle_rad, {});
+  judge_y();
+  filter_.miss();
+}
+
 void MipEkf::innovate(const Mip::Sample& z) noexcept {
   Mip::Sample::WheelFlags wheel = z.wheel_ok;
   for (bool& ok : wheel) ok = ok && z.encoders_ok;
@@ -235,7 +246,7 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
   y(Model::kAccelY) = z.accel_B_m_s2.y();
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
-  without_y_ = filter_.row_nis()[Model::kGyro + 1] > kOddNis ? kWithoutTicks : std::max(without_y_ - 1, 0);
+  judge_y();
   filter_.innovate(
       time_.acted(), y,
       {imu && axis[0], imu && axis[1] && without_y_ == 0, imu && axis[2], wheel[0], wheel[1], imu});

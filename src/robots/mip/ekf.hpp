@@ -92,8 +92,10 @@ class MipEkf {
   void start_moving(double lean, const Vec3& gyro_bias_B_rad_s, const Mip::Sample& z) noexcept;
   /// A tick without samples; `u` acted in it.
   void predict(const Vec2& u) noexcept;
-  /// The samples at the end of the predicted tick.
+  /// The samples at the end of the predicted tick. Without any there is nothing to correct: a loop that was
+  /// late catches up by predictions.
   void update(const Mip::Sample& z) noexcept {
+    if (!z.imu_ok && !z.encoders_ok) return miss(z);
     innovate(z);
     correct();
   }
@@ -124,6 +126,9 @@ class MipEkf {
   double tilt_sigma_rad() const noexcept { return std::sqrt(filter_.variance(Model::kTheta)); }
 
  private:
+  void judge_y() noexcept;
+  void miss(const Mip::Sample& z) noexcept;
+
   MipKinematics kinematics_;
   Filter filter_;
   TimeBase<2, 2> time_;

@@ -319,5 +319,38 @@ TYPED_TEST(PackedFilterTest, WithoutSamplesChangesNothing) {
   EXPECT_EQ(this->packed_.normalized_innovation(), 0.0);
 }
 
+/// Innovations of rows that are not used are told, too: zeros mean that none was computed. It is half of a
+/// step.
+template <class Ekf, class Sample, class Config>
+void expect_a_prediction(const Config& config, Sample z) {
+  z.gyro_B_rad_s.setConstant(0.3);
+  z.wheel_angle_rad.setConstant(0.2);
+  z.imu_ok = z.encoders_ok = true;
+  Ekf filter(config.robot, config.estimators.ekf);
+  for (int k = 0; k < 3; ++k) {
+    filter.predict(Vec<Ekf::Model::kInputs>::Zero());
+    filter.update(z);
+  }
+  EXPECT_NE(filter.row_innovation()[0], 0.0);
+  z.imu_ok = z.encoders_ok = false;
+  Ekf predicted = filter;
+  predicted.predict(Vec<Ekf::Model::kInputs>::Zero());
+  filter.predict(Vec<Ekf::Model::kInputs>::Zero());
+  filter.update(z);
+  EXPECT_EQ(filter.x(), predicted.x());
+  EXPECT_EQ(filter.P(), predicted.P());
+  for (const double innovation : filter.row_innovation()) EXPECT_EQ(innovation, 0.0);
+  for (const double nis : filter.row_nis()) EXPECT_EQ(nis, 0.0);
+  filter.predict(Vec<Ekf::Model::kInputs>::Zero());
+  z.imu_ok = true;
+  filter.update(z);
+  EXPECT_NE(filter.x(), predicted.x());
+}
+
+TEST(Ekf, ATickWithoutSamplesIsAPrediction) {
+  expect_a_prediction<MbbrEkf>(MbbrCase{}.config, Mbbr::Sample{});
+  expect_a_prediction<MipEkf>(MipCase{}.config, Mip::Sample{});
+}
+
 }  // namespace
 }  // namespace equipoise

@@ -342,8 +342,21 @@ TEST(Pipeline, WhenTheGuardHasCutInTheMotorsCoastedFromItsFourthTickOn) {
   EXPECT_THAT(given_over_a_gap(true, kWriteFailed), ElementsAre(0.3, 0.3, 0.3, 0.3, 0.3, 0.3));
   EXPECT_THAT(given_over_a_gap(true, kOverrun), ElementsAre(0.3, 0.3, 0.3, 0.1, 0.1, 0.1))
       << "by the model's rate, 8 of 80 rad/s";
-  EXPECT_THAT(given_over_a_gap(false, kOverrun), ElementsAre(0.3, 0.3, 0.3, 0.25, 0.25, 0.25))
-      << "by the encoders', 20 of 80 rad/s";
+}
+
+/// The tick after a stall has its own time to keep: what ends the run anyway is not caught up with.
+TEST(Pipeline, AStallThatDisarmsIsNotCaughtUpWith) {
+  const auto updates = [](bool predicts, int missed, std::uint32_t inhibit) {
+    Bench<> b;
+    b.script.health.predicts_wheels = predicts;
+    b.steps(2);
+    b.step(missed, inhibit);
+    return b.script.updates.size();
+  };
+  EXPECT_EQ(updates(true, 12, kOverrun), 13U);
+  EXPECT_EQ(updates(true, 13, kOverrun), 1U) << "longer than safety.max_stalled_ticks";
+  EXPECT_EQ(updates(false, 12, kOverrun), 1U) << "an estimator whose model does not bridge";
+  EXPECT_EQ(updates(false, 2, 0), 3U);
 }
 
 }  // namespace
