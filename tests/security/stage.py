@@ -193,9 +193,13 @@ class Flown:
             time.sleep(0.005)
 
     def ever_on(self, seconds: float) -> bool:
+        return self.comes_to(True, seconds)
+
+    def comes_to(self, enabled: bool, seconds: float = 5.0) -> bool:
+        """What it has confirmed reaches its body a tick later; on a busy machine, much later."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            if self.enabled:
+            if self.enabled == enabled:
                 return True
             time.sleep(0.002)
         return False
