@@ -10,6 +10,9 @@ import pytest
 BOARDS = {"mbbr": "robotics_cape_mbbr", "edumip": "robotics_cape_edumip"}
 
 
+MBBR = Path(__file__).resolve().parents[2] / "config/mbbr.toml"
+
+
 def equipoise(root, *arguments, **popen):
     command = [root / "build/host/equipoise", *arguments]
     return subprocess.run(
@@ -19,7 +22,9 @@ def equipoise(root, *arguments, **popen):
 
 def on_stand(root, command, *arguments, robot="mbbr"):
     board = root / f"config/boards/{BOARDS[robot]}.toml"
-    bench = ["--config", root / f"config/{robot}.toml", "--board", board, "--backend", "stand"]
+    bench = ["--board", board, "--backend", "stand"]
+    if "--config" not in arguments:
+        bench += ["--config", root / f"config/{robot}.toml"]
     return equipoise(root, *command.split(), *bench, "--json", "-", *arguments)
 
 
@@ -47,6 +52,21 @@ def test_motion_is_refused_with_its_size_and_nothing_is_written(root, tmp_path):
     assert ended.returncode == 1
     assert re.search(r"30\.\d deg/s at rest is no bias", ended.stderr) and ended.stderr.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_poor_fit_of_the_accelerometer_is_not_kept(root, tmp_path):
+    """Beyond 15 mg, hardware.md says, nothing is written: what was measured before stays."""
+    out = tmp_path / "calibration.toml"
+    assert on_stand(root, "calibrate accel", "--out", out).returncode == 0
+    good = out.read_bytes()
+    table = re.search(r"^\[world\.nominal\]$.*?^accel_sigma_m_s2 = (\S+)$", MBBR.read_text(), re.M | re.S)
+    shaken = tmp_path / "shaken.toml"  # a noise of 4 m/s2: means of 200 samples are off by 30 mg
+    shaken.write_text(MBBR.read_text()[: table.start(1)] + "4.0" + MBBR.read_text()[table.end(1) :])
+    ended = on_stand(root, "calibrate accel", "--config", shaken, "--seed", "2", "--out", out)
+    assert ended.returncode == 1 and f"not written to {out}" in ended.stderr
+    result = json.loads(ended.stdout)
+    assert result["check_error_mg"] > 15.0 and "the fit is poor" in result["complaint"]
+    assert out.read_bytes() == good
 
 
 def test_a_wiring_fault_fails_the_calibration_and_names_the_cure(root, tmp_path):

@@ -5,6 +5,7 @@ import re
 import shutil
 import socket
 import subprocess
+from fnmatch import fnmatch
 
 import pytest
 from equipoise_tools.lockstep_client import Robot
@@ -229,3 +230,31 @@ def test_every_library_of_the_robots_package_comes_from_a_package_it_depends_on(
         }
         assert owners & depends, f"{library} of {owners}, package depends on {depends}"
     assert len(needed) >= 5
+
+
+def group_of(rules: str, device: dict[str, str], parents: list[str]) -> str | None:
+    """By udev(7): matches with ==, KERNELS against the device or any parent; the last GROUP stays."""
+    group = None
+    for rule in rules.splitlines():
+        words = re.findall(r'([A-Z]+)(==|\+=|=)"([^"]*)"', "" if rule.startswith("#") else rule)
+        names = {"KERNELS": [device["KERNEL"], *parents], **{key: [value] for key, value in device.items()}}
+        matches = [(names.get(key, []), value) for key, operator, value in words if operator == "=="]
+        if words and all(any(fnmatch(name, value) for name in found) for found, value in matches):
+            group = next(
+                (value for key, operator, value in words if (key, operator) == ("GROUP", "=")), group
+            )
+    return group
+
+
+# AM335x Technical Reference Manual, table 2-2 and 2-3: I2C0 has the power controller and the board's EEPROM, I2C1 is
+# free, I2C2 goes to the cape and, on the Blue, to the IMU.
+@pytest.mark.parametrize(
+    ("address", "group"), [("44e0b000", None), ("4802a000", None), ("4819c000", "equipoise")]
+)
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_of_the_buses_only_the_imus_belongs_to_the_group(root, address, group, number):
+    """The kernel numbers buses as it finds them: the address names the bus, the number does not."""
+    rules = (root / "packaging/90-equipoise.rules").read_text()
+    bus = {"SUBSYSTEM": "i2c-dev", "KERNEL": f"i2c-{number}"}
+    parents = [f"i2c-{number}", f"{address}.i2c", f"{address}.target-module", "ocp"]
+    assert group_of(rules, bus, parents) == group

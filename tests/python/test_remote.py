@@ -250,6 +250,33 @@ def test_learn_refuses_what_cannot_be_told_apart(root, tmp_path):
     assert status != 0 and "needs arm and disarm" in said and not out.exists()
 
 
+@pytest.mark.slow
+def test_learn_does_not_listen_for_ever_to_bytes_without_a_pause(root, tmp_path):
+    """An app that sends by itself, or a wrong baud rate: nothing is learnt and the user is told."""
+    master, slave = os.openpty()
+    os.set_blocking(master, False)
+    out, stop = tmp_path / "learnt.toml", threading.Event()
+
+    def feed():
+        while not stop.wait(0.02):
+            with contextlib.suppress(BlockingIOError):
+                os.write(master, b"x")
+
+    command = [root / "build/host/equipoise", "remote", "learn", "--port", os.ttyname(slave), "--out", out]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as learn:
+        feeder = threading.Thread(target=feed)
+        feeder.start()
+        try:
+            said = learn.communicate(timeout=DEADLINE_S)[1]
+        finally:
+            learn.kill()
+            stop.set()
+            feeder.join()
+    assert learn.returncode == 1 and "without a pause" in said and not out.exists()
+    os.close(master)
+    os.close(slave)
+
+
 def test_what_was_pressed_while_lines_was_stopped_is_void_but_for_a_disarm(root, tmp_path):
     gamepad = Gamepad(tmp_path)
     command = [root / "build/host/equipoise", "remote", "lines", gamepad.config]

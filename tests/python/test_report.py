@@ -171,6 +171,54 @@ def test_user_errors_are_one_line_and_status_2(tmp_path, capsys, known_log):
     assert capsys.readouterr().err.startswith(f"error: {blocked}")
 
 
+def rewritten(path, log, change):
+    """The log with every message but its description changed."""
+    import equipoise
+
+    import lcm
+
+    kinds = [getattr(equipoise, name) for name in dir(equipoise) if name.endswith("_t")]
+    of = {kind._get_packed_fingerprint(): kind for kind in kinds}
+    out = lcm.EventLog(str(path), "w")
+    for event in lcm.EventLog(str(log)):
+        message = of[event.data[:8]].decode(event.data)
+        if event.channel != names.RUN:
+            change(message)
+        out.write_event(event.timestamp, event.channel, message.encode())
+    out.close()
+    return path
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [lambda us: 0, lambda us: 10**9 - us, lambda us: us if us < 9_000_000 else 2**63 - 1],
+    ids=["still", "backwards", "to the end of time"],
+)
+def test_a_log_whose_time_makes_no_sense_is_refused_in_one_line(known_log, tmp_path, capsys, stamp):
+    def change(message):
+        message.utime = stamp(message.utime)
+
+    path = rewritten(tmp_path / "odd.lcm", known_log, change)
+    assert report.main([str(path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"error: {path}: EQUIPOISE_") and said.count("\n") == 1
+    assert "its time stands still, goes back or lasts for 30 years" in said
+
+
+@pytest.mark.filterwarnings("ignore")  # of NumPy and Matplotlib about such numbers
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -1e308])
+def test_a_log_of_numbers_that_are_none_is_reported_all_the_same(known_log, tmp_path, number):
+    def change(message):
+        for name in message.__slots__:
+            value = getattr(message, name)
+            if isinstance(value, float):
+                setattr(message, name, number)
+            elif isinstance(value, (list, tuple)) and value and isinstance(value[0], float):
+                setattr(message, name, [number] * len(value))
+
+    assert report.main([str(rewritten(tmp_path / "odd.lcm", known_log, change))]) == 0
+
+
 @pytest.mark.parametrize(
     "module", ["report", "tally", "view", "lockstep_client", "reliability", "lint", "experiments"]
 )
