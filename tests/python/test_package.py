@@ -246,8 +246,8 @@ def group_of(rules: str, device: dict[str, str], parents: list[str]) -> str | No
     return group
 
 
-# AM335x Technical Reference Manual, table 2-2 and 2-3: I2C0 has the power controller and the board's EEPROM, I2C1 is
-# free, I2C2 goes to the cape and, on the Blue, to the IMU.
+# AM335x Technical Reference Manual, tables 2-2 and 2-3: I2C0 has the power controller and the board's EEPROM,
+# I2C1 is free, I2C2 goes to the cape and, on the Blue, to the IMU.
 @pytest.mark.parametrize(
     ("address", "group"), [("44e0b000", None), ("4802a000", None), ("4819c000", "equipoise")]
 )

@@ -38,8 +38,7 @@ def ended(process):
 
 def send(holder, *arguments):
     """With the patience of a user of a busy machine: where others fill its cores, what goes through a
-    pseudo-terminal waits for a thread of the kernel's, and `send` says itself when it was stopped for too long.
-    """
+    pseudo-terminal waits for a thread of the kernel's, and `send` says when it was stopped for too long."""
     if "--timeout-s" not in arguments:
         arguments += ("--timeout-s", "10")
     for _ in range(5):

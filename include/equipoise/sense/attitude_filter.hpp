@@ -22,7 +22,9 @@ struct AttitudeFilterParams {
   double bias_sigma_motion_rad_s = 0.1 * kPi / 180.0;
   double bias_forgetting_s = 100.0;  // time in which the bias may wander by 0.1 deg/s
   double bias_limit_rad_s = 2.0 * kPi / 180.0;
-  double rest_rate_rad_s = 2.0 * kPi / 180.0;  // deviation from the average below which it may be at rest
+  // Deviation from the average below which it may be at rest: four sigma of an MPU-9250 (data sheet: 0.1
+  // deg/s at 92 Hz). A balancing robot sways slowly; what passes for rest is averaged into the bias.
+  double rest_rate_rad_s = 0.4 * kPi / 180.0;
   double rest_accel_m_s2 = 0.5;
   double rest_after_s = 0.4;        // a robot stands for half a second before it arms
   double mag_norm_tolerance = 0.1;  // share; beyond it the field is disturbed and not used
