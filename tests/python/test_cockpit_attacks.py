@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import pytest
 from equipoise_tools import names
 from equipoise_tools.cockpit.hub import Cockpit
+from equipoise_tools.cockpit.robot import Child, SimulatedRobot
 from started_cockpit import PATIENCE_S, in_a_loop, talk
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
@@ -89,6 +90,62 @@ def test_a_request_of_any_shape_leaves_the_page_its_control(cockpit):
 def test_who_has_not_taken_control_cannot_restart_a_robot_that_runs(cockpit):
     cockpit.firmware()
     in_a_loop(as_client(cockpit, {"do": "restart"}, error="take control first"))
+
+
+def test_two_pages_that_restart_at_once_get_one_robot(monkeypatch):
+    """Two on one group and key would be taken for one."""
+
+    async def run():
+        hub = Cockpit(SimpleNamespace(robot="mbbr", config=None))
+        hub.simulated = SimulatedRobot("", "", Path(), [], lambda: None)
+        monkeypatch.setattr(hub.simulated, "command", lambda: ["sleep", "600"])
+        hub.remote = SimpleNamespace(stop=lambda: asyncio.sleep(0.05), start=lambda: None)
+        started = []
+        begin = Child.start
+
+        async def start(child, *arguments):
+            await begin(child, *arguments)
+            started.append(child)
+
+        monkeypatch.setattr(Child, "start", start)
+        await asyncio.gather(hub.restart(), hub.restart(), hub.restart())
+        assert len(started) == 3 and sum(child.running for child in started) == 1
+        await hub.simulated.stop()
+
+    in_a_loop(run())
+
+
+def test_who_has_not_taken_control_cannot_end_anothers_recording(cockpit):
+    async def run():
+        headers = {"Origin": cockpit.origin}
+        owner = await websocket_connect(HTTPRequest(f"ws://{cockpit.host}/socket", headers=headers))
+        for request in (
+            {"do": "hello", "token": cockpit.token},
+            {"do": "take"},
+            {"do": "record", "on": True},
+        ):
+            await owner.write_message(json.dumps(request))
+        while True:
+            message = await asyncio.wait_for(owner.read_message(), PATIENCE_S)
+            if isinstance(message, str) and json.loads(message).get("status", {}).get("recording"):
+                break
+        await as_client(cockpit, {"do": "record", "on": False}, error="may need what is recorded")
+        await owner.write_message(json.dumps({"do": "record", "on": False}))
+        while True:
+            message = await asyncio.wait_for(owner.read_message(), PATIENCE_S)
+            if (
+                isinstance(message, str)
+                and json.loads(message).get("status", {"recording": 1})["recording"] is None
+            ):
+                break
+        owner.close()
+
+    in_a_loop(asyncio.wait_for(run(), PATIENCE_S))
+
+
+def test_half_a_character_is_a_wrong_token(cockpit):
+    closed = in_a_loop(talk(cockpit, [], token="\ud800", origin=cockpit.origin))
+    assert closed == 4401
 
 
 def test_a_body_is_not_read_before_its_sender_is_known(cockpit):

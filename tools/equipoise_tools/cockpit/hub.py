@@ -93,6 +93,7 @@ class Cockpit:
         self._told = ""
         self._soon: asyncio.Handle | None = None
         self._loop = asyncio.get_running_loop()
+        self._starting = asyncio.Lock()
         self._layouts = frames.layouts()
         self._run_kind = next(k for k in message_types().values() if k.name == "run_t")
 
@@ -221,13 +222,15 @@ class Cockpit:
     # From the pages.
 
     async def restart(self) -> None:
-        """Whoever talks to the old robot must not be taken to talk to the new one."""
+        """Whoever talks to the old robot must not be taken to talk to the new one; two pages that ask at once
+        get one robot."""
         if self.simulated is None:
             raise UserError("only a simulated robot can be started from here")
-        await self.remote.stop()
-        await self.simulated.start()
-        self.heard_s = -math.inf
-        self.remote.start()
+        async with self._starting:
+            await self.remote.stop()
+            await self.simulated.start()
+            self.heard_s = -math.inf
+            self.remote.start()
 
     async def set_parameters(self, changes: dict[str, str]) -> None:
         """Simulation: checked by the firmware's own reader, then the robot starts anew with them."""

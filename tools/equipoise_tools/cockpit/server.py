@@ -152,7 +152,8 @@ class Page(tornado.websocket.WebSocketHandler):
         token = request.get("token")
         if do != "hello" or not isinstance(token, str):
             token = ""
-        if not hmac.compare_digest(token.encode(), self.cockpit.token.encode()):
+        shown = token.encode(errors="replace")  # JSON can write half a character
+        if not hmac.compare_digest(shown, self.cockpit.token.encode()):
             self.cockpit.refused["token"] += 1
             self.close(4401, "wrong token")
             return
@@ -201,6 +202,8 @@ class Page(tornado.websocket.WebSocketHandler):
         elif do == "seen":
             cockpit.seen.append(request["page"] | {"lag_s": cockpit._lag_s, "dropped": self.dropped})
         elif do == "record":
+            if not request["on"] and cockpit.in_control not in (None, self):
+                raise UserError("read-only: another page is in control and may need what is recorded")
             cockpit.record(bool(request["on"]))
         elif do == "restart":
             running = cockpit.simulated is not None and cockpit.simulated.running
@@ -226,8 +229,12 @@ class Page(tornado.websocket.WebSocketHandler):
     async def _play(self, do: str, request: dict) -> None:
         if do == "open":
             path = self.cockpit.log_path(str(request["log"]))
-            self.playback = await asyncio.to_thread(Playback, path)
-            self.tell(playback=await asyncio.to_thread(self.playback.describe))
+            playback = await asyncio.to_thread(Playback, path)
+            described = await asyncio.to_thread(playback.describe)
+            if self.ws_connection is None:  # closed meanwhile: nobody would end the player
+                return
+            self.playback = playback
+            self.tell(playback=described)
             self._show(self.playback.seek(self.playback.first_s))
             if self._player is None:
                 self._player = asyncio.create_task(self._keep_playing())
