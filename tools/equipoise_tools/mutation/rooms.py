@@ -76,6 +76,16 @@ CONTROL_TESTS = {
     **dict.fromkeys(("friction", "gain_schedule"), "gain_schedule"),
     **{name: name for name in ("margins", "plausible")},
 }
+# Of the application what has tests in C++; commands and files are tested from outside, in Python.
+APP_TESTS = {
+    "trial/path": "app/path",
+    "trial/verdict": "unit/app/verdict",
+    "run/relay": "app/relay",
+    "run/status_indicator": "app/status_indicator",
+    "guard/service_notify": "app/service_notify",
+    "commission/calibrate_imu": "app/calibrate_imu",
+    **{f"remote/{n}": "app/remote" for n in ("hand_remote", "frame_learning", "event_device", "remote_file")},
+}
 
 ROOMS: dict[str, Room] = {
     "safety": Room(
@@ -236,6 +246,32 @@ ROOMS: dict[str, Room] = {
                 only=("*/chain.hpp", "src/control/*.cpp"),
             ),
         ),
+    ),
+    "robot_control": Room(
+        (
+            *(f"src/robots/mip/{n}" for n in ("reference.cpp", "lqr_feedback.hpp", "slc_feedback.hpp")),
+            *(f"src/robots/mbbr/{n}" for n in ("reference.cpp", "scheduled_feedback.cpp")),
+        ),
+        (
+            Stage("tests/unit_tests", ("unit/robots/*_test.cpp", "unit/control/mbbr_control_test.cpp")),
+            Stage(
+                "tests/scenario_tests",
+                tuple(f"scenario/{n}_test.cpp" for n in ("mip_balance", "signs", "paths")),
+            ),
+        ),
+        target=0.9,
+    ),
+    "app": Room(
+        tuple(f"src/app/{name}.cpp" for name in APP_TESTS),
+        tuple(
+            Stage(
+                "tests/unit_tests" if test.startswith("unit/") else "tests/app_tests",
+                (f"{test}_test.cpp",),
+                only=(f"src/app/{name}.cpp",),
+            )
+            for name, test in APP_TESTS.items()
+        ),
+        target=0.9,
     ),
     "pipeline": Room(
         ("include/equipoise/pipeline.hpp",),
