@@ -41,8 +41,24 @@ def test_a_log_is_not_converted_onto_itself(do, log, tmp_path):
         ["y.csv", "--to", "csv"],  # its default name
     ):
         assert "is the log itself" in do("convert", *arguments, status=2)
-    assert "is another log" in do("convert", "x.lcm", "--to", "csv", "--out", "y.csv", status=2)
+    assert "holds no csv" in do("convert", "x.lcm", "--to", "csv", "--out", "y.csv", status=2)
     assert log.read_bytes() == before and (tmp_path / "y.csv").read_bytes() == before
+
+
+def test_a_result_replaces_only_its_own_kind(do, log, root, tmp_path):
+    notes = tmp_path / "notes.md"
+    notes.write_text("A winter's work\n")
+    for kind, command in {
+        "csv": ["convert", "x.lcm", "--to", "csv", "--out"],
+        "mcap": ["convert", "x.lcm", "--to", "mcap", "--out"],
+        "summary of a campaign": ["campaign", "--config", root / "config/edumip.toml", "--markdown"],
+        "buttons of an app": ["remote", "learn", "--port", "/dev/null", "--out"],
+    }.items():
+        assert f"notes.md: exists and holds no {kind}" in do(*command, "notes.md", status=2)
+    for _ in range(2):
+        do("convert", "x.lcm", "--to", "csv", status=0)
+        do("convert", "x.lcm", "--to", "mcap", status=0)
+    assert notes.read_text() == "A winter's work\n"
 
 
 def test_json_replaces_json_only(do, log, root, tmp_path):

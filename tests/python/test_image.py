@@ -28,6 +28,13 @@ def test_bad_usage_is_one_line_before_anything_is_built(root, arguments, complai
     assert len(ended.stderr.splitlines()) == 1 and complaint in ended.stderr
 
 
+def test_only_an_image_is_replaced(root, tmp_path):
+    notes = tmp_path / "notes"
+    notes.write_text("mine\n" * 200)
+    ended = image(root, "--no-login", "--output", str(notes))
+    assert ended.returncode == 2 and f"--output {notes}: exists and is no image" in ended.stderr
+
+
 def test_a_private_key_is_refused(root, tmp_path):
     (tmp_path / "id").write_text("-----BEGIN OPENSSH PRIVATE KEY-----\n")
     ended = image(root, "--ssh-key", str(tmp_path / "id"))

@@ -152,6 +152,11 @@ def test_errors_name_the_key_and_the_fix(root, table, tmp_path):
     assert 'no column "gyro"' in run("import", table, "--map", bad, "-o", tmp_path / "a.lcm", status=2).stderr
     bad.write_text(good.read_text().replace('unit = "deg/s"', 'unit = "dps"'))
     assert "gyro.unit" in run("import", table, "--map", bad, "-o", tmp_path / "a.lcm", status=2).stderr
+    far = pd.read_csv(table)
+    far.loc[far.index[-1], "t"] = 3e7
+    far.to_csv(tmp_path / "far.csv", index=False)
+    said = run("import", tmp_path / "far.csv", "--map", good, "-o", tmp_path / "a.lcm", status=2).stderr
+    assert "two hours are the most" in said and said.count("\n") == 1
     matlab = tmp_path / "a.mat"
     matlab.write_bytes(b"MATLAB 5.0")
     assert "./tools/table" in run("import", matlab, "--map", good, "-o", tmp_path / "a.lcm", status=2).stderr

@@ -11,6 +11,7 @@
 #include "app/cli/commands.hpp"
 #include "app/evaluate/fault_run.hpp"
 #include "app/evaluate/parallel.hpp"
+#include "app/text/files.hpp"
 #include "app/text/json.hpp"
 #include "app/text/reasons.hpp"
 #include "app/trial/firmware.hpp"
@@ -179,6 +180,7 @@ std::string cell_of(const std::vector<FaultOutcome>& outcomes) {
 }
 
 int campaign(const CampaignArguments& a) {
+  if (!a.markdown.empty()) check_output(a.markdown, {"## "}, "summary of a campaign");
   const RobotType& type = robot_type_of(robot_type(a.config), a.config);
   Choice choice;
   choice.controller = a.controller;

@@ -5,6 +5,7 @@
 
 #include "app/cli/commands.hpp"
 #include "app/identify/identification.hpp"
+#include "app/text/files.hpp"
 #include "app/text/json.hpp"
 #include "equipoise/config.hpp"
 
@@ -27,10 +28,11 @@ struct Keys {
 
 /// Only what the data determine goes into the fragment; the rest is said in comments.
 void write_fragment(const IdentifyArguments& a, const Keys& wanted, const Identified& found) {
+  const std::string beginning = "# Identified from ";
+  check_output(a.out, {beginning}, "identified parameters");
   std::ofstream file(a.out);
   file.precision(5);
-  file << "# Identified from " << a.log << "; name it in the configuration: include = [\"" << a.out
-       << "\"]\n";
+  file << beginning << a.log << "; name it in the configuration: include = [\"" << a.out << "\"]\n";
   const auto is_key = [&](const std::string& name) {
     return std::find(wanted.keys.begin(), wanted.keys.end(), name) != wanted.keys.end();
   };

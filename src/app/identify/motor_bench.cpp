@@ -6,6 +6,7 @@
 #include "app/cli/commands.hpp"
 #include "app/cli/progress.hpp"
 #include "app/identify/bench_log.hpp"
+#include "app/text/files.hpp"
 #include "app/text/json.hpp"
 
 namespace equipoise::app {
@@ -37,6 +38,7 @@ void write_log(const std::string& path, BridgeType bridge, const std::vector<Ben
 
 void write_trace(const std::string& path, const std::vector<BenchSample>& log,
                  const std::vector<double>& coast, const std::vector<double>& linear) {
+  check_output(path, {"t_s,"}, "trace");
   std::ofstream file(path);
   file << "t_s,u,supply_V,angle_rad,current_A,drive_coast_A,linear_A\n";
   for (std::size_t i = 0; i < log.size(); ++i) {

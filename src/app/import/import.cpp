@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "app/text/errors.hpp"
+#include "app/text/format.hpp"
 #include "app/trial/firmware_of.hpp"
 #include "robots/robot_list.hpp"
 
@@ -208,6 +209,13 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
   }
   if (rows.t_s.size() < 2)
     throw InputError("fewer than two rows of the table are in the time that the map asks for");
+  constexpr double kLongest_s = 7200.0;  // one wrong stamp would ask for ticks until the memory is full
+  const double lasts_s = rows.t_s.back() - rows.t_s.front();
+  if (!(lasts_s <= kLongest_s))
+    throw InputError(
+        format("the table's time runs for %.3g s, from %.6g to %.6g: two hours are the most; cut it with "
+               "time.from_s and to_s of the map",
+               lasts_s, rows.t_s.front(), rows.t_s.back()));
   const std::size_t n = used.size();
   rows.gyro_rad_s.resize(n);
   rows.accel_m_s2.resize(n);

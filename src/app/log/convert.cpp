@@ -8,6 +8,7 @@
 #include "app/cli/commands.hpp"
 #include "app/log/mcap_writer.hpp"
 #include "app/log/run_log.hpp"
+#include "app/text/files.hpp"
 #include "app/text/json.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 #include "equipoise/runtime/wire.hpp"
@@ -225,10 +226,7 @@ int convert(ConvertArguments a) {
     if (std::filesystem::equivalent(part, a.out, ignored))
       throw InputError("--out " + a.out + ": is the log itself; choose another name");
   }
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(a.out, ignored) && std::filesystem::file_size(a.out, ignored) > 0 &&
-      runtime::is_log_or_empty(a.out))
-    throw InputError("--out " + a.out + ": is another log; choose another name");
+  check_output(a.out, {a.to == "csv" ? "t_s,tick" : "\x89MCAP"}, a.to);
   std::ofstream file(a.out, std::ios::binary);
   const std::int64_t ticks = a.to == "csv" ? write_csv(a.log, file) : write_mcap(a.log, file);
   if (!file.flush()) throw InputError(a.out + ": cannot be written");

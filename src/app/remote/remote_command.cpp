@@ -14,6 +14,7 @@
 #include "app/remote/frame_learning.hpp"
 #include "app/remote/hand_remote.hpp"
 #include "app/remote/seconds.hpp"
+#include "app/text/files.hpp"
 #include "serial.h"
 
 namespace equipoise::app {
@@ -122,6 +123,7 @@ std::string file_of(const LearnArguments& a, const std::vector<FrameBinding>& fr
 }
 
 int learn(const LearnArguments& a) {
+  check_output(a.out, {"# Buttons of an app"}, "buttons of an app");
   watch_interrupts();
   Port port(a);
   std::vector<FrameBinding> frames;

@@ -41,16 +41,29 @@ std::string read_text(const std::string& path) {
   return text.str();
 }
 
-std::string json_output_error(const std::string& path) {
-  if (path == "-") return "";
+std::string output_error(const std::string& path, const std::vector<std::string>& beginnings,
+                         const std::string& kind) {
   if (is_unread_pipe(path)) return path + ": is a pipe that nobody reads";
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return "";
   std::ifstream file(path, std::ios::binary);
-  file >> std::ws;
-  const int first = file.peek();
-  if (first == EOF || first == '{' || first == '[') return "";
-  return path + ": exists and holds no JSON; choose another name";
+  std::string begin(64, '\0');
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<std::size_t>(file.gcount()));
+  begin.erase(0, begin.find_first_not_of(" \t\r\n"));
+  const bool ours =
+      begin.empty() || std::any_of(beginnings.begin(), beginnings.end(),
+                                   [&](const std::string& b) { return begin.rfind(b, 0) == 0; });
+  return ours ? "" : path + ": exists and holds no " + kind + "; choose another name";
+}
+
+void check_output(const std::string& path, const std::vector<std::string>& beginnings,
+                  const std::string& kind) {
+  if (const std::string error = output_error(path, beginnings, kind); !error.empty()) throw InputError(error);
+}
+
+std::string json_output_error(const std::string& path) {
+  return path == "-" ? "" : output_error(path, {"{", "["}, "JSON");
 }
 
 std::string printable(const std::string& text) {

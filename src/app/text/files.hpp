@@ -2,15 +2,21 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace equipoise::app {
 
 /// A whole file; InputError names it.
 std::string read_text(const std::string& path);
 
-/// Why a result must not be written there as JSON; empty: it may. What holds something else is not
-/// overwritten.
+/// Why a result of a kind must not be written there; empty: it may. What begins like none of its kind is
+/// somebody else's.
+std::string output_error(const std::string& path, const std::vector<std::string>& beginnings,
+                         const std::string& kind);
 std::string json_output_error(const std::string& path);
+/// The same, thrown.
+void check_output(const std::string& path, const std::vector<std::string>& beginnings,
+                  const std::string& kind);
 
 /// For a terminal: control characters, which it would obey, as '?'.
 std::string printable(const std::string& text);
