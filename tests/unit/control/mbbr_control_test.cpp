@@ -69,6 +69,74 @@ TEST(MbbrReference, IntegratesCommandsAndTurnsThemWithTheHeading) {
   EXPECT_NEAR(ref.theta_z, kPi / 2.0 + 1.0, 1e-9);
 }
 
+/// [T] (6.6)-(6.9): the ball's errors are inertial and resolved in the yaw frame.
+TEST(MbbrReference, ErrorsAreReferenceMinusEstimateInTheYawFrame) {
+  MbbrReferenceStage stage(reference_params());
+  MbbrEstimate x;
+  x.theta_z = kPi / 2.0;
+  x.phi = Vec2(7.0, -3.0);
+  stage.reset(x);
+  x.phi += Vec2(0.3, 0.1);
+  x.phi_dot_star = Vec2(0.5, -0.25);
+  x.theta_xy = Vec2(0.02, -0.01);
+  x.omega_B = Vec3(0.4, -0.2, 0.1);
+  x.theta_dot = Vec3(0.3, 0.6, 0.8);
+  x.theta_z += 0.2;
+  const MbbrReference ref = stage.update(Command{}, x);
+  const double c = std::cos(kPi / 2.0 + 0.2);
+  const double s = std::sin(kPi / 2.0 + 0.2);
+  EXPECT_NEAR(ref.d_phi.x(), -0.3 * c - 0.1 * s, 1e-12);
+  EXPECT_NEAR(ref.d_phi.y(), 0.3 * s - 0.1 * c, 1e-12);
+  EXPECT_EQ(ref.d_phi_dot_unfiltered, Vec2(-0.5, 0.25));
+  EXPECT_EQ(ref.d_theta, Vec2(-0.02, 0.01)) << "no lean is asked for yet";
+  EXPECT_EQ(ref.d_rate, Vec2(-0.4, 0.2)) << "body rates";
+  EXPECT_NEAR(ref.d_theta_z, -0.2, 1e-12);
+  EXPECT_EQ(ref.d_yaw_rate, -0.8);
+  EXPECT_NEAR(ref.theta_z, kPi / 2.0, 1e-12);
+  EXPECT_EQ(ref.phi, Vec2(7.0, -3.0));
+  const StateView v = view(ref, MbbrParameters{});
+  EXPECT_EQ(v.theta_rad, Vec3(0.0, 0.0, ref.theta_z));
+  EXPECT_EQ(v.phi_rad, ref.phi);
+}
+
+/// Duty of a wheel: 0.5 may be used, 0.1 per rad/s of yaw, 2 per m/s.
+TEST(MbbrReference, TravelGetsWhatTheTurnLeavesInItsDirection) {
+  MbbrReferenceParams p = reference_params();
+  p.budget = {0.5, 0.0, 0.1, 2.0};
+  const auto speed = [&p](const Vec2& asked, double yaw_rate) {
+    MbbrReferenceStage stage(p);
+    stage.reset(MbbrEstimate{});
+    Command command;
+    command.velocity_W_m_s = asked;
+    command.yaw_rate_rad_s = yaw_rate;
+    MbbrReference ref;
+    for (int k = 0; k < 10; ++k) ref = stage.update(command, MbbrEstimate{});
+    return Vec2(ball_velocity(0.032, ref.phi_dot_star));
+  };
+  EXPECT_LT((speed({0.6, 0.8}, 0.0) - Vec2(0.15, 0.2)).norm(), 1e-9);
+  EXPECT_LT((speed({-0.6, 0.8}, -3.0) - Vec2(-0.06, 0.08)).norm(), 1e-9);
+  EXPECT_LT((speed({0.03, 0.04}, 3.0) - Vec2(0.03, 0.04)).norm(), 1e-9);
+}
+
+/// "Forward" is where the robot looked at the last reset of its heading.
+TEST(MbbrReference, AHeadingResetTurnsForward) {
+  MbbrReferenceStage stage(reference_params());
+  stage.reset(MbbrEstimate{});
+  MbbrEstimate x;
+  x.theta_z = kPi / 2.0;
+  Command command;
+  command.velocity_W_m_s = Vec2(0.1, 0.0);
+  command.heading_reset = true;
+  MbbrReference ref;
+  for (int k = 0; k < 200; ++k) {
+    ref = stage.update(command, x);
+    command.heading_reset = false;
+  }
+  const Vec2 position = ball_velocity(0.032, ref.phi);
+  EXPECT_NEAR(position.x(), 0.0, 1e-9);
+  EXPECT_NEAR(position.y(), 0.1, 1e-9);
+}
+
 TEST(MbbrReference, InertialFiltersDoNotLagWithTheSpin) {
   // Given a constant inertial rate error and a spinning robot, the inertial low-pass reaches it exactly; in
   // the yaw frame it is attenuated and rotated.
