@@ -121,12 +121,13 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
         encoder_check_.update(safety_.armed(), duty_previous_, z.wheel_angle_rad));
   }
 
-  /// What friction takes from the drive: of wheels that turn, and of wheels that may be held by it.
-  Input friction_of(const typename Robot::Sample& z, const Input& u) noexcept {
-    constexpr int kTurn = Robot::kInputs - 1;  // about the vertical, of robots that turn
-    Input friction = kinematics_.friction_input(p_.friction, z.wheel_rate_rad_s);
-    friction(kTurn) += encoder_probe_.update(safety_.armed(), z, u(kTurn));
-    return friction;
+  /// Turns the robot on the spot where no encoder counts, which standing still does not explain; on a robot
+  /// that does not turn, about its only input. Friction may hold the wheels, so the estimators are not told.
+  Input encoder_excitation(const typename Robot::Sample& z, const Input& u) noexcept {
+    constexpr int kLast = Robot::kInputs - 1;
+    Input excitation = Input::Zero();
+    excitation(kLast) = encoder_probe_.update(safety_.armed(), z, u(kLast));
+    return excitation;
   }
 
   Wheels within_supply(const Input& u, double limit) const noexcept {
@@ -154,12 +155,13 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   }
 
   /// What the estimators' linear model has felt: the command before compensation, [T] section 6.1, as far as
-  /// the supply allowed it; with coasting motors, the input that just cancels the back-EMF.
-  Input applied_input(const Result& t, const Input& friction) const noexcept {
+  /// the supply allowed it; with coasting motors, the input that just cancels the back-EMF. `beside`: what it
+  /// is not told of.
+  Input applied_input(const Result& t, const Input& beside) const noexcept {
     if (!t.motors.enable) return coasting(t.z.wheel_rate_rad_s);
     if (!t.saturated) return t.u_lin;
     const double share = bridge_.supply_V(t.z.battery_V, t.z.battery_ok) / p_.motor.nominal_V;
-    return kinematics_.axes_from_wheels(within_supply(t.u_friction, share)) - friction;
+    return kinematics_.axes_from_wheels(within_supply(t.u_friction, share)) - beside;
   }
 
   Input coasting(const Wheels& rate_rad_s) const noexcept {
@@ -187,7 +189,8 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.disturbance = health_.disturbance;
     in.left_out = t.degraded & kSensorsLeftOut;
     in.tilt_sigma_rad = health_.tilt_sigma_rad;
-    if (t.z.gyro_axis_ok[2] && !health_.gyro_left_out) in.slip_rad_s = slip_rad_s<Robot>(t, kinematics_, 0);
+    if (t.z.gyro_axis_ok[2] && !health_.gyro_left_out)
+      in.slip_rad_s = Robot::slip_rad_s(t.z, kinematics_, t.x_hat);
     in.saturated = t.saturated;
     in.all_finite = in.all_finite && t.u_friction.allFinite();
     in.bridges_gaps = health_.predicts_wheels;
@@ -204,17 +207,6 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     const double fastest_rad_s = 1.5 * p.motor.no_load_rad_s(p.motor.nominal_V);
     f.max_counts_per_tick = 1.0 + p.calibration.encoder_counts_per_rev / (2.0 * kPi) * fastest_rad_s * kTickS;
     return f;
-  }
-
-  /// Encoders against gyro, of robots that can tell.
-  template <class R>
-  static auto slip_rad_s(const Result& t, const typename R::Kinematics& kinematics, int) noexcept
-      -> decltype(R::slip_rad_s(t.z, kinematics, t.x_hat)) {
-    return R::slip_rad_s(t.z, kinematics, t.x_hat);
-  }
-  template <class R>
-  static double slip_rad_s(const Result&, const typename R::Kinematics&, long) noexcept {
-    return 0.0;
   }
 
   static constexpr int kGuardTicks =
@@ -250,11 +242,12 @@ auto Pipeline<Robot, Estimators, Reference, Feedback>::tick(const RawSample& raw
   t.ref = follow(limited(safety_.timely(asked), t.degraded), t.x_hat);  // [T] 6.2.1
   t.u_lin = feedback_.update(t.ref);                                    // [T] (6.10)
   t.u_lin += encoder_stimulus(t.z);  // shakes each wheel right after arming
-  const Input friction = friction_of(t.z, t.u_lin);
-  t.u_friction = t.u_lin + friction;            // [T] 6.2.2
+  const Input friction = kinematics_.friction_input(p_.friction, t.z.wheel_rate_rad_s);  // [T] 6.2.2
+  const Input beside = friction + encoder_excitation(t.z, t.u_lin);
+  t.u_friction = t.u_lin + beside;
   const MotorCommand duty = invert_bridges(t);  // [T] 6.2.3, ch. 4
   t.motors = safety_.gate(duty, checks(t, asked, loop.inhibit));
-  applied(applied_input(t, friction), !safety_.armed());
+  applied(applied_input(t, beside), !safety_.armed());
   duty_previous_ = wheel_duty(t.motors);
   t.arm_state = safety_.state();
   t.reasons = safety_.reasons();

@@ -10,6 +10,9 @@
 
 namespace equipoise {
 
+template <int Wheels>
+struct EstimatorHealth;  // estimate/health.hpp
+
 template <class Robot, class Estimators, class Reference, class Feedback>
 struct RobotContract {
   using Kinematics = typename Robot::Kinematics;
@@ -42,6 +45,23 @@ struct RobotContract {
   static_assert(noexcept(std::declval<Estimators&>().update(std::declval<const Sample&>(),
                                                             std::declval<const Input&>(), bool())),
                 "the tick does not throw");
+  static_assert(
+      std::is_same_v<decltype(std::declval<const Estimators&>().health()), EstimatorHealth<Robot::kWheels>>,
+      "Estimators::health() is what the active estimator thinks of the sensors");
+  static_assert(std::is_same_v<decltype(std::declval<const Estimators&>().isolates()), bool>,
+                "Estimators::isolates(): the active estimator finds faulty encoders itself");
+  static_assert(std::is_same_v<decltype(std::declval<const Estimators&>().reads_attitude()), bool>,
+                "Estimators::reads_attitude(): an estimator that runs needs the attitude source");
+  static_assert(std::is_same_v<decltype(Robot::slip_rad_s(std::declval<const Sample&>(),
+                                                          std::declval<const Kinematics&>(),
+                                                          std::declval<const Estimate&>())),
+                               double>,
+                "Robot::slip_rad_s(sample, kinematics, estimate): encoders against gyro; 0 where not judged");
+  static_assert(
+      std::is_same_v<decltype(std::declval<Reference&>().reset(std::declval<const Estimate&>())), void>,
+      "Reference::reset(estimate) starts from where the robot is");
+  static_assert(std::is_same_v<decltype(Feedback::kSharesDuty), const bool>,
+                "Feedback::kSharesDuty: Kinematics::allocate(input, limit) shares a short supply");
   static_assert(std::is_same_v<decltype(std::declval<Reference&>().update(std::declval<const Command&>(),
                                                                           std::declval<const Estimate&>())),
                                typename Reference::Reference>,

@@ -15,15 +15,16 @@ namespace {
 
 const std::vector<std::string> kBridgeNames{"drive_brake", "drive_coast"};
 
+/// The name under which a file has this world; logs of earlier builds call the nominal one full.
+std::string world_key(const Section& worlds, const std::string& fidelity) {
+  const bool optional = fidelity == "nominal" || fidelity == "built2025";
+  return optional && !worlds.has(fidelity) ? "full" : fidelity;
+}
+
 }  // namespace
 
 double number_or(Section& s, const char* key, double otherwise, double min, double max) {
   return s.has(key) ? s.number(key, min, max) : otherwise;
-}
-
-std::string world_key(const Section& worlds, const std::string& fidelity) {
-  const bool optional = fidelity == "nominal" || fidelity == "built2025";
-  return optional && !worlds.has(fidelity) ? "full" : fidelity;
 }
 
 void expect_robot(Section& robot, const std::string& type) {
@@ -279,6 +280,32 @@ WorldParams read_world(Section s, BridgeType* bridge, const RobotsOwn& own) {
   }
   s.finish();
   return w;
+}
+
+void read_machine(Section& root, int wheels, CommonConfig* c) {
+  c->motor = read_motor(root.table("motor"));
+  c->calibration = read_calibration(root.table("calibration"), wheels);
+  Section friction = root.table("friction");
+  c->friction.gain = friction.number("compensation", 0.0, 1.5);
+  friction.finish();
+}
+
+void read_surroundings(Section& root, const Vec3& imu_position_m,
+                       const std::function<void(Section, std::size_t)>& world, CommonConfig* c) {
+  c->safety = read_safety(root.table("safety"));
+  c->attitude = read_attitude(root.table("attitude"), imu_position_m);
+  c->chain = read_chain(root.table("chain"));
+  Section worlds = root.table("world");
+  for (std::size_t i = 0; i < kFidelityNames.size(); ++i)
+    world(worlds.table(world_key(worlds, kFidelityNames[i])), i);
+  worlds.finish();
+  if (root.has("population")) root.table("population");  // checked and read elsewhere
+  root.finish();
+}
+
+void refuse(const DesignProblem& problem, const Section& controller, const Section& robot) {
+  if (problem.parameter.empty()) controller.fail("design", problem.why);
+  robot.fail(problem.parameter, problem.why);
 }
 
 }  // namespace config

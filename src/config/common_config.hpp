@@ -4,16 +4,19 @@
 
 #include <functional>
 
+#include "config/population.hpp"
 #include "config/toml_reader.hpp"
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/actuate/safety.hpp"
 #include "equipoise/control/chain.hpp"
 #include "equipoise/control/governor.hpp"
+#include "equipoise/control/plausible.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/estimate/lanes.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/sense/attitude_filter.hpp"
 #include "equipoise/sense/calibrate.hpp"
+#include "robots/common/config.hpp"
 
 namespace equipoise::config {
 
@@ -22,9 +25,6 @@ void expect_robot(Section& robot, const std::string& type);
 
 /// For keys that logs of earlier builds lack.
 double number_or(Section& s, const char* key, double otherwise, double min, double max);
-
-/// The name under which a file has this world; logs of earlier builds call the nominal one full.
-std::string world_key(const Section& worlds, const std::string& fidelity);
 
 /// ConfigError when compensated friction takes all that a command may ask for.
 void require_room(const Section& reference, const DutyBudget& budget);
@@ -36,6 +36,23 @@ Chain read_chain(Section s);
 Precision read_precision(Section& s);
 /// Of our own filter; `imu_position_m`: lever arm.
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m);
+/// Motor, calibration and friction compensation.
+void read_machine(Section& root, int wheels, CommonConfig* c);
+/// Safety, attitude filter, delays, population and, by `world`, the worlds by level: the rest of the file.
+void read_surroundings(Section& root, const Vec3& imu_position_m,
+                       const std::function<void(Section, std::size_t)>& world, CommonConfig* c);
+
+/// A design that does not exist, at the key that is the cause.
+[[noreturn]] void refuse(const DesignProblem& problem, const Section& controller, const Section& robot);
+
+/// `read`: the whole file.
+template <class Config>
+Loaded<Config> loaded(const Document& document, Config (*read)(Section root)) {
+  Config config = read(Section(document, document.root(), ""));
+  check_population(document.root());
+  return {std::move(config), document.keys(), document.sha256(), document.canonical()};
+}
+
 /// What of a world only one robot has.
 struct RobotsOwn {
   bool has_ball = false;

@@ -72,7 +72,7 @@ class SetText {
       std::size_t end = path.find('.', begin);
       last = end == std::string::npos;
       if (last) end = path.size();
-      at = step(at, path.substr(begin, end - begin), last ? &value : nullptr);
+      at = step(at, path.substr(begin, end - begin), last ? value.get("value") : nullptr);
       begin = end + 1;
     }
   }
@@ -93,7 +93,7 @@ class SetText {
   }
 
   /// Along one part of the key, name[2][0]; the last part takes the value.
-  toml::node* step(toml::node* node, const std::string& part, toml::table* value) const {
+  toml::node* step(toml::node* node, const std::string& part, toml::node* value) const {
     const std::size_t bracket = std::min(part.find('['), part.size());
     const std::string name = trimmed(part.substr(0, bracket));
     toml::table* table = node->as_table();
@@ -101,7 +101,7 @@ class SetText {
     const bool new_include = name == "include" && value != nullptr && bracket == part.size();
     if (table == nullptr || (found == nullptr && !new_include)) fail_unknown();
     if (bracket == part.size()) {
-      if (value != nullptr) put(value, found, [&](auto& v) { table->insert_or_assign(name, std::move(v)); });
+      if (value != nullptr && !merged(value, found)) table->insert_or_assign(name, std::move(*value));
       return found;
     }
     if (found == nullptr) fail_unknown();
@@ -119,28 +119,23 @@ class SetText {
              std::to_string(array->size() - 1) + "]");
       found = array->get(i);
       open = close + 1;
-      if (open == part.size() && value != nullptr)
-        put(value, found,
-            [&](auto& v) { array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(i), std::move(v)); });
+      if (open == part.size() && value != nullptr && !merged(value, found))
+        array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(i), std::move(*value));
     }
     return found;
   }
 
-  /// A table's keys go into the table that stands there; anything else replaces.
-  template <class Replace>
-  void put(toml::table* holder, toml::node* present, Replace&& replace) const {
-    toml::node& value = *holder->get("value");
-    if (present == nullptr || !present->is_table()) {
-      value.visit([&](auto& v) { replace(v); });
-      return;
-    }
-    if (!value.is_table()) fail("is a table; set one of its keys");
-    if (value.as_table()->empty()) fail("sets nothing; name a key of the table");
+  /// A table's keys go into the table that stands there; anything else is to replace it.
+  bool merged(toml::node* value, toml::node* present) const {
+    if (present == nullptr || !present->is_table()) return false;
+    if (!value->is_table()) fail("is a table; set one of its keys");
+    if (value->as_table()->empty()) fail("sets nothing; name a key of the table");
     try {
-      merge(*present->as_table(), std::move(*value.as_table()), "", "");
+      merge(*present->as_table(), std::move(*value->as_table()), "", "");
     } catch (const ConfigError&) {
       fail("no such key in the configuration");
     }
+    return true;
   }
 
   static std::string trimmed(const std::string& text) {
@@ -177,12 +172,9 @@ class SetText {
   mutable const toml::table* root_ = nullptr;  // while applying
 };
 
-template <std::size_t N>
-void put_numbers(toml::table& calibration, const char* key,
-                 const std::optional<std::array<double, N>>& values) {
-  if (!values) return;
+void put_numbers(toml::table& calibration, const char* key, const double* values, std::size_t count) {
   toml::array array;
-  for (const double value : *values) array.push_back(value);
+  for (std::size_t i = 0; i < count; ++i) array.push_back(values[i]);
   calibration.insert_or_assign(key, std::move(array));
 }
 
@@ -296,10 +288,13 @@ void check_board(const toml::table& root, const std::string& path, const BoardFa
 void apply_measured(toml::table& root, const MeasuredCalibration& measured) {
   toml::table* calibration = root["calibration"].as_table();
   if (calibration == nullptr) return;  // reading it will say so
-  put_numbers(*calibration, "R_BS", measured.R_BS);
-  put_numbers(*calibration, "gyro_bias_rad_s", measured.gyro_bias_B_rad_s);
-  put_numbers(*calibration, "accel_scale", measured.accel_scale_S);
-  put_numbers(*calibration, "accel_bias_m_s2", measured.accel_bias_B_m_s2);
+  const auto put = [&](const char* key, const auto& values) {
+    if (values) put_numbers(*calibration, key, values->data(), values->size());
+  };
+  put("R_BS", measured.R_BS);
+  put("gyro_bias_rad_s", measured.gyro_bias_B_rad_s);
+  put("accel_scale", measured.accel_scale_S);
+  put("accel_bias_m_s2", measured.accel_bias_B_m_s2);
 }
 
 void apply_set(toml::table& root, const std::string& text) { SetText(text).apply(root); }

@@ -14,6 +14,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "equipoise/config.hpp"
+
 namespace equipoise::runtime {
 namespace {
 
@@ -50,7 +52,7 @@ CommandKey from_hex(const std::string& path, const std::string& hex) {
   const bool good =
       sodium_hex2bin(bytes.data(), bytes.size(), hex.data(), hex.size(), nullptr, &decoded, nullptr) == 0 &&
       hex.size() == 2 * CommandKey::kBytes && decoded == CommandKey::kBytes;
-  if (!good) throw std::runtime_error(path + ": is no key; equipoise keygen makes one");
+  if (!good) throw ConfigError(path + ": is no key; equipoise keygen makes one");
   const CommandKey key(bytes);
   sodium_memzero(bytes.data(), bytes.size());
   return key;
@@ -61,12 +63,12 @@ std::string private_text(const std::string& path, bool any_owner = false) {
   const File file{open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};  // a pipe is not waited for
   struct stat about {};
   if (file.fd < 0 || fstat(file.fd, &about) != 0)
-    throw std::runtime_error(path + ": " + std::strerror(errno) + "; make a key with equipoise keygen");
-  if (!S_ISREG(about.st_mode)) throw std::runtime_error(path + ": is no file");
+    throw ConfigError(path + ": " + std::strerror(errno) + "; make a key with equipoise keygen");
+  if (!S_ISREG(about.st_mode)) throw ConfigError(path + ": is no file");
   if ((about.st_mode & 077U) != 0)
-    throw std::runtime_error(path + ": others may read or write this key; chmod 600 " + path);
+    throw ConfigError(path + ": others may read or write this key; chmod 600 " + path);
   if (about.st_uid != geteuid() && about.st_uid != 0 && !(any_owner && geteuid() == 0))
-    throw std::runtime_error(path + ": belongs to another user; chown it to the one who runs this");
+    throw ConfigError(path + ": belongs to another user; chown it to the one who runs this");
   std::string text(kLongestFile, '\0');
   const ssize_t size = read(file.fd, text.data(), text.size());
   text.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
@@ -83,16 +85,16 @@ bool write_all(int fd, std::string&& text) {
 
 void write_private(const std::string& path, std::string&& text) {
   const File file{open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
-  if (file.fd < 0) throw std::runtime_error(path + ": " + std::strerror(errno));
+  if (file.fd < 0) throw ConfigError(path + ": " + std::strerror(errno));
   if (write_all(file.fd, std::move(text))) return;
   unlink(path.c_str());
-  throw std::runtime_error(path + ": cannot be written");
+  throw ConfigError(path + ": cannot be written");
 }
 
 void check_name(const std::string& what, const std::string& name) {
   if (!is_command_name(name))
-    throw std::runtime_error(what + " \"" + name +
-                             "\": one to sixteen letters, digits, '-', '_' and '.' are allowed");
+    throw ConfigError(what + " \"" + name +
+                      "\": one to sixteen letters, digits, '-', '_' and '.' are allowed");
 }
 
 }  // namespace
@@ -150,8 +152,7 @@ CommandKey CommandKeys::announcements() const { return announcements_; }
 CommandKey CommandKeys::commands(const std::string& holder) const {
   if (holder_.empty()) return secret_.derived("commands of " + holder);
   if (holder_ != holder)
-    throw std::runtime_error("this key is " + holder_ + "'s; one for " + holder +
-                             " is made from the robot's own");
+    throw ConfigError("this key is " + holder_ + "'s; one for " + holder + " is made from the robot's own");
   return secret_;
 }
 
@@ -175,7 +176,7 @@ CommandKeys CommandKeys::read(const std::string& path, const std::string& text) 
   const bool named = is_command_name(robot) && (kind != "holder" || is_command_name(holder));
   std::string more;
   if (magic != kMagic || (kind != "robot" && kind != "holder") || !named || in >> more)
-    throw std::runtime_error(path + ": is no key; equipoise keygen makes one");
+    throw ConfigError(path + ": is no key; equipoise keygen makes one");
   if (kind == "robot") return of_robot(robot, from_hex(path, secret));
   return {robot, holder, from_hex(path, secret), from_hex(path, announcements)};
 }
@@ -197,12 +198,12 @@ void CommandKeys::rotate(const std::string& link) {
   need_sodium();
   const CommandKeys old = read(link, private_text(link, true));
   if (!old.holder_.empty())
-    throw std::runtime_error(link + ": is " + old.holder_ + "'s; the robot's own key is rotated");
+    throw ConfigError(link + ": is " + old.holder_ + "'s; the robot's own key is rotated");
   const std::string path = std::filesystem::canonical(link).string();
   struct stat about {};
   std::string fresh = path + ".XXXXXX";
   const File file{mkostemp(fresh.data(), O_CLOEXEC)};  // for its owner only
-  if (file.fd < 0) throw std::runtime_error(fresh + ": " + std::strerror(errno));
+  if (file.fd < 0) throw ConfigError(fresh + ": " + std::strerror(errno));
   const bool done = stat(path.c_str(), &about) == 0 &&
                     write_all(file.fd, of_robot(old.robot_, random_key()).text()) &&
                     (geteuid() != 0 || fchown(file.fd, about.st_uid, about.st_gid) == 0) &&
@@ -210,7 +211,7 @@ void CommandKeys::rotate(const std::string& link) {
   if (done) return;
   const int error = errno;
   unlink(fresh.c_str());
-  throw std::runtime_error(path + ": " + std::strerror(error));
+  throw ConfigError(path + ": " + std::strerror(error));
 }
 
 }  // namespace equipoise::runtime

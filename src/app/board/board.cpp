@@ -17,10 +17,9 @@ using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 constexpr int kMaxLine = 31;  // a GPIO bank of the AM335x has 32 lines
 
-template <std::size_t N>
-void copy_text(Section& s, const std::string& key, char (&to)[N]) {
+void copy_text(Section& s, const std::string& key, char* to, std::size_t size) {
   const std::string value = s.text(key);
-  if (value.size() >= N) s.fail(key, "is too long; allowed: " + std::to_string(N - 1) + " characters");
+  if (value.size() >= size) s.fail(key, "is too long; allowed: " + std::to_string(size - 1) + " characters");
   if (value.find('\0') != std::string::npos) s.fail(key, "holds a zero character");
   std::memcpy(to, value.c_str(), value.size() + 1);
 }
@@ -55,7 +54,7 @@ int read_one_of(Section& s, const std::string& key, const std::vector<int>& valu
 
 bbb_imu_t read_imu(Section s, std::array<double, 9>* R_BS) {
   bbb_imu_t imu{};
-  copy_text(s, "bus", imu.bus);
+  copy_text(s, "bus", imu.bus, sizeof imu.bus);
   imu.address = static_cast<std::uint16_t>(s.integer("address", 0x08, 0x77));
   imu.rate_hz = static_cast<std::uint16_t>(s.integer("rate_hz", 200, 200));
   imu.gyro_range_dps = static_cast<std::uint16_t>(read_one_of(s, "gyro_range_deg_s", {250, 500, 1000, 2000}));
@@ -64,7 +63,7 @@ bbb_imu_t read_imu(Section s, std::array<double, 9>* R_BS) {
   imu.stuck_after = static_cast<std::uint16_t>(s.integer("stuck_after_samples", 0, 1000));
   imu.interrupt = read_pin(s, "interrupt", s.boolean("interrupt_active_low"));
   imu.late_after_us = static_cast<std::uint32_t>(s.integer("late_after_us", 1, 5000));
-  copy_text(s, "dmp_firmware", imu.dmp_firmware);
+  copy_text(s, "dmp_firmware", imu.dmp_firmware, sizeof imu.dmp_firmware);
   Eigen::Map<RowMajor>(R_BS->data()) = s.rotation("R_BS");
   s.finish();
   return imu;
@@ -76,10 +75,10 @@ bbb_motor_t read_motor(Section& s) {
   motor.in1 = read_pin(s, "in1");
   motor.in2 = read_pin(s, "in2");
   if (s.has("fault")) motor.fault = read_pin(s, "fault", true);  // SF pulls low
-  copy_text(s, "pwm", motor.pwm);
+  copy_text(s, "pwm", motor.pwm, sizeof motor.pwm);
   motor.pwm_channel = static_cast<std::uint32_t>(s.choice("pwm_channel", {"A", "B"}));
   motor.motor_reversed = s.boolean("motor_reversed");
-  copy_text(s, "encoder", motor.encoder);
+  copy_text(s, "encoder", motor.encoder, sizeof motor.encoder);
   motor.encoder_reversed = s.boolean("encoder_reversed");
   s.finish();
   return motor;
@@ -87,7 +86,7 @@ bbb_motor_t read_motor(Section& s) {
 
 /// Battery scale, and the channel's own entries.
 void read_battery(Section s, Board* board) {
-  copy_text(s, "adc", board->wiring.adc);
+  copy_text(s, "adc", board->wiring.adc, sizeof board->wiring.adc);
   board->wiring.battery_channel = static_cast<std::uint32_t>(s.integer("channel", 0, 7));
   board->facts.battery_V_per_count = s.number("V_per_count", 1e-6, 1.0);
   board->facts.battery_offset_V = s.number("offset_V", -5.0, 5.0);

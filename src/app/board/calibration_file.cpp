@@ -88,10 +88,7 @@ std::string toml_array(const std::vector<double>& values) {
   return text + "]";
 }
 
-template <class Container>
-std::string array_of(const Container& values) {
-  return toml_array(std::vector<double>(values.data(), values.data() + values.size()));
-}
+std::string toml_array(const Vec3& v) { return toml_array(std::vector<double>(v.data(), v.data() + 3)); }
 
 std::string text_of(const CalibrationFile::Stamp& stamp) {
   std::string text = "date = \"" + stamp.date + "\"\n";
@@ -140,17 +137,18 @@ std::string to_toml(const CalibrationFile& file) {
   text += "version = " + std::to_string(kVersion) + "\nrobot = \"" + file.robot +
           "\"\nwheels = " + std::to_string(file.wheel_count) + "\n";
   if (file.gyro) {
-    text += "\n[gyro]\n" + text_of(file.gyro->stamp) + "bias_rad_s = " + array_of(file.gyro->bias_rad_s) +
-            "\nsigma_rad_s = " + array_of(file.gyro->sigma_rad_s) + "\n";
+    text += "\n[gyro]\n" + text_of(file.gyro->stamp) + "bias_rad_s = " + toml_array(file.gyro->bias_rad_s) +
+            "\nsigma_rad_s = " + toml_array(file.gyro->sigma_rad_s) + "\n";
   }
   if (file.accel) {
-    text += "\n[accel]\n" + text_of(file.accel->stamp) + "scale = " + array_of(file.accel->scale) +
-            "\nbias_m_s2 = " + array_of(file.accel->bias_m_s2) +
+    text += "\n[accel]\n" + text_of(file.accel->stamp) + "scale = " + toml_array(file.accel->scale) +
+            "\nbias_m_s2 = " + toml_array(file.accel->bias_m_s2) +
             "\ncheck_error_m_s2 = " + toml_number(file.accel->check_error_m_s2) + "\n";
   }
   if (file.mount) {
     const RowMajor rows = file.mount->R_BS;
-    text += "\n[mount]\n" + text_of(file.mount->stamp) + "R_BS = " + array_of(rows) + "\n";
+    text += "\n[mount]\n" + text_of(file.mount->stamp) +
+            "R_BS = " + toml_array(std::vector<double>(rows.data(), rows.data() + rows.size())) + "\n";
   }
   if (file.motors) {
     text += "\n[motors]\n" + text_of(file.motors->stamp) +

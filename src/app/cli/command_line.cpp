@@ -35,16 +35,8 @@ std::string number_error(const std::string& text) {
   return "";
 }
 
-template <class T>
-CLI::Option* add(void* impl, const std::string& name, T& value, const std::string& help) {
-  return app_of(impl)->add_option(name, value, help);
-}
-
-template <class Number, class T>
-CLI::Option* add_numbers(void* impl, const std::string& name, T& value, const std::string& help) {
-  CLI::Option* option = add(impl, name, value, help);
-  CLI::Validator check(number_error<Number>, std::string{});
-  option->check(check);
+CLI::Option* checked(CLI::Option* option, std::string (*error)(const std::string&)) {
+  option->check(CLI::Validator(error, std::string{}));
   return option;
 }
 
@@ -178,33 +170,31 @@ Subcommand Subcommand::subcommand(const std::string& name, const std::string& he
 void Subcommand::require_subcommand() const { app_of(impl_)->require_subcommand(1); }
 
 Option Subcommand::option(const std::string& name, std::string& value, const std::string& help) const {
-  CLI::Option* option = add(impl_, name, value, help);
-  CLI::Validator check([](const std::string& path) { return json_output_error(path); }, std::string{});
-  if (name == "--json") option->check(check);  // before the job, not after it
-  return Option(option);
+  CLI::Option* option = app_of(impl_)->add_option(name, value, help);
+  return Option(name == "--json" ? checked(option, json_output_error) : option);  // before the job
 }
 Option Subcommand::option(const std::string& name, double& value, const std::string& help) const {
-  return Option(add_numbers<double>(impl_, name, value, help));
+  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<double>));
 }
 Option Subcommand::option(const std::string& name, int& value, const std::string& help) const {
-  return Option(add_numbers<int>(impl_, name, value, help));
+  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<int>));
 }
 Option Subcommand::option(const std::string& name, std::int64_t& value, const std::string& help) const {
-  return Option(add_numbers<std::int64_t>(impl_, name, value, help));
+  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<std::int64_t>));
 }
 Option Subcommand::option(const std::string& name, std::uint64_t& value, const std::string& help) const {
-  return Option(add_numbers<std::uint64_t>(impl_, name, value, help));
+  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<std::uint64_t>));
 }
 Option Subcommand::option(const std::string& name, std::vector<std::string>& value,
                           const std::string& help) const {
-  return Option(add(impl_, name, value, help));
+  return Option(app_of(impl_)->add_option(name, value, help));
 }
 Option Subcommand::option(const std::string& name, std::vector<double>& value,
                           const std::string& help) const {
-  return Option(add_numbers<double>(impl_, name, value, help));
+  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<double>));
 }
 Option Subcommand::option(const std::string& name, std::vector<int>& value, const std::string& help) const {
-  return Option(add_numbers<int>(impl_, name, value, help));
+  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<int>));
 }
 Option Subcommand::flag(const std::string& name, bool& value, const std::string& help) const {
   return Option(app_of(impl_)->add_flag(name, value, help));

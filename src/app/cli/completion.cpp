@@ -4,6 +4,13 @@
 #include "app/cli/description.hpp"
 
 namespace equipoise::app {
+
+void for_each_command(const CommandDescription& command,
+                      const std::function<void(const CommandDescription&)>& f) {
+  f(command);
+  for (const CommandDescription& below : command.commands) for_each_command(below, f);
+}
+
 namespace {
 
 using Command = CommandDescription;

@@ -2,6 +2,7 @@
 // parser's own options, so that nothing is said twice -> out: a tree of commands. Start-up only.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -28,11 +29,8 @@ struct CommandDescription {
 };
 
 /// f(command) for the root and all below, parents first.
-template <class F>
-void for_each_command(const CommandDescription& command, F&& f) {
-  f(command);
-  for (const CommandDescription& below : command.commands) for_each_command(below, f);
-}
+void for_each_command(const CommandDescription& command,
+                      const std::function<void(const CommandDescription&)>& f);
 
 /// A script for the shell: bash, zsh or fish.
 std::string completion(const CommandDescription& program, const std::string& shell);

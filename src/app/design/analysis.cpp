@@ -23,23 +23,23 @@ nlohmann::json to_json(const Margins& m) {
 
 nlohmann::json to_json(const Complex& value) { return nlohmann::json::array({value.real(), value.imag()}); }
 
-template <class Values>
-nlohmann::json complex_list(const Values& values) {
+nlohmann::json complex_list(const Eigen::VectorXcd& values) {
   nlohmann::json list = nlohmann::json::array();
   for (const Complex& value : values) list.push_back(to_json(value));
   return list;
 }
 
 /// One yaw rate: margins of the loop broken at each place.
-template <class Controller>
-nlohmann::json judged(const Plant& plant, const Controller& settled, bool bode) {
-  const Loop loop = whole_loop(plant, AboutSteadySpin<Controller>(settled));
+nlohmann::json judged(const Plant& plant, const SettledController& settled, bool bode) {
+  const Loop loop = whole_loop(plant, settled);
   nlohmann::json row{{"stable", loop.stable}};
   const std::array<const std::vector<Complex>*, 3> L{&loop.at_u, &loop.at_gyro, &loop.at_encoder};
   for (std::size_t i = 0; i < L.size(); ++i) {
     row["margins"][kBrokenAt[i]] =
         to_json(margins(loop.omega_rad_s, *L[i], plant.centre_rad_s(), kSlow_rad_s));
-    if (bode) row["loop"][kBrokenAt[i]] = complex_list(*L[i]);
+    if (bode)
+      row["loop"][kBrokenAt[i]] = complex_list(
+          Eigen::Map<const Eigen::VectorXcd>(L[i]->data(), static_cast<Eigen::Index>(L[i]->size())));
   }
   if (bode) row["omega_rad_s"] = loop.omega_rad_s;
   return row;
@@ -48,19 +48,17 @@ nlohmann::json judged(const Plant& plant, const Controller& settled, bool bode) 
 nlohmann::json plant_json(const CMatrix& A, const CMatrix& b, const CMatrix& K, double delay_s) {
   const SampledSystem s = sampled(A, b, kTickS, delay_s);
   nlohmann::json rows = nlohmann::json::array();
-  for (Eigen::Index i = 0; i < A.rows(); ++i) rows.push_back(complex_list(Eigen::VectorXcd(A.row(i))));
+  for (Eigen::Index i = 0; i < A.rows(); ++i) rows.push_back(complex_list(A.row(i)));
   return {{"A", rows},
-          {"b", complex_list(Eigen::VectorXcd(b.col(0)))},
-          {"K", complex_list(Eigen::VectorXcd(K.row(0)))},
+          {"b", complex_list(b.col(0))},
+          {"K", complex_list(K.row(0))},
           {"poles", complex_list(closed_loop_poles(s, K))}};
 }
 
-template <std::size_t N>
-std::size_t index_of(const std::array<const char*, N>& names, const std::string& name) {
-  for (std::size_t i = 0; i < N; ++i) {
-    if (name == names[i]) return i;
-  }
-  throw ConfigError("--estimator " + name + ": not known to this robot");
+std::size_t index_of(const std::vector<std::string>& names, const std::string& name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) throw ConfigError("--estimator " + name + ": not known to this robot");
+  return static_cast<std::size_t>(found - names.begin());
 }
 
 /// The controller asked for; the first where none is.
@@ -74,9 +72,8 @@ std::string controller_of(const DesignRequest& a, const std::array<const char*, 
 std::string estimator_of(const DesignRequest& a) { return a.estimator.empty() ? "ekf" : a.estimator; }
 
 /// Adds to `out`, which holds what is the robot's own, the choices and row_at(yaw rate, rad/s) for each one.
-template <class RowAt>
 nlohmann::json with_rows(const DesignRequest& a, const std::string& controller, const std::string& sha256,
-                         nlohmann::json out, RowAt&& row_at) {
+                         nlohmann::json out, const std::function<nlohmann::json(double)>& row_at) {
   out["estimator"] = estimator_of(a);
   out["controller"] = controller;
   out["config_sha256"] = sha256;
@@ -93,7 +90,8 @@ nlohmann::json with_rows(const DesignRequest& a, const std::string& controller, 
 nlohmann::json mbbr_design(const DesignRequest& a) {
   Loaded<MbbrConfig> loaded = load_mbbr(a.config, a.set);
   MbbrConfig& c = loaded.config;
-  c.estimators.active = static_cast<MbbrEstimatorId>(index_of(kMbbrEstimatorNames, estimator_of(a)));
+  c.estimators.active = static_cast<MbbrEstimatorId>(
+      index_of({kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end()}, estimator_of(a)));
   const std::string controller = controller_of(a, {"scheduled", "thesis"});
   c.reference.budget = DutyBudget{};
 
@@ -111,8 +109,9 @@ nlohmann::json mbbr_design(const DesignRequest& a) {
     const Plant plant = mbbr_plant(c.robot, yaw_rate, c.chain);
     nlohmann::json row =
         controller == "thesis"
-            ? judged(plant, MbbrController<MbbrThesisFeedback>(c, c.thesis, yaw_rate), a.bode)
-            : judged(plant, MbbrController<MbbrScheduledFeedback>(c, c.scheduled, yaw_rate), a.bode);
+            ? judged(plant, SettledControllerOf<MbbrSpin, MbbrThesisFeedback>(c, c.thesis, yaw_rate), a.bode)
+            : judged(plant, SettledControllerOf<MbbrSpin, MbbrScheduledFeedback>(c, c.scheduled, yaw_rate),
+                     a.bode);
     const MbbrLinear linear = mbbr_linear(c.robot, yaw_rate);
     const CMatrix K = mbbr_lqr(c.robot, c.design, yaw_rate);
     row["lqr"] = plant_json(linear.A, linear.b, K, c.design.input_delay_s);
@@ -127,7 +126,8 @@ nlohmann::json to_json(const SecondOrder& d) {
 nlohmann::json mip_design(const DesignRequest& a) {
   Loaded<MipConfig> loaded = load_mip(a.config, a.set);
   MipConfig& c = loaded.config;
-  c.estimators.active = static_cast<MipEstimatorId>(index_of(kMipEstimatorNames, estimator_of(a)));
+  c.estimators.active = static_cast<MipEstimatorId>(
+      index_of({kMipEstimatorNames.begin(), kMipEstimatorNames.end()}, estimator_of(a)));
   const std::string controller = controller_of(a, {"slc", "lqr"});
   c.reference.budget = DutyBudget{};
   c.reference.max_phi_error_rad = kUnlimited;
@@ -148,9 +148,10 @@ nlohmann::json mip_design(const DesignRequest& a) {
   K << g.lqr.theta, g.lqr.phi, g.lqr.theta_dot, g.lqr.phi_dot, -g.lqr.u_before;
   return with_rows(a, controller, loaded.sha256, out, [&](double yaw_rate) {
     const Plant plant = mip_plant(c.robot, yaw_rate, c.chain);
-    nlohmann::json row = controller == "lqr"
-                             ? judged(plant, MipController<MipLqrFeedback>(c, c.lqr, yaw_rate), a.bode)
-                             : judged(plant, MipController<MipSlcFeedback>(c, c.slc, yaw_rate), a.bode);
+    nlohmann::json row =
+        controller == "lqr"
+            ? judged(plant, SettledControllerOf<MipSpin, MipLqrFeedback>(c, c.lqr, yaw_rate), a.bode)
+            : judged(plant, SettledControllerOf<MipSpin, MipSlcFeedback>(c, c.slc, yaw_rate), a.bode);
     const MipLinear linear = mip_linear(c.robot, yaw_rate);
     row["lqr"] = plant_json(linear.A, linear.b, K, c.design.input_delay_s);
     return row;

@@ -14,122 +14,103 @@ namespace equipoise::app {
 Plant mbbr_plant(const MbbrParameters& p, double yaw_rate_rad_s, const Chain& chain);
 Plant mip_plant(const MipParameters& p, double yaw_rate_rad_s, const Chain& chain);
 
-inline constexpr int kSettleTicks = 1200;  // the filters' gains are steady then
+/// The MBBR's signals there; its tick without friction, bridge and safety.
+struct MbbrSpin {
+  using Config = MbbrConfig;
+  using Robot = Mbbr;
+  using Estimators = MbbrEstimators;
+  using Reference = MbbrReferenceStage;
 
-/// Runs beside a twin that gets no disturbance; its answer is the difference.
-template <class Controller>
-class AboutSteadySpin {
- public:
-  explicit AboutSteadySpin(const Controller& settled) : disturbed_(settled), steady_(settled) {}
-  Complex step(const Readings& readings, Complex u_before) {
-    return disturbed_.step(readings, u_before) - steady_.step({}, {});
+  static double yaw_acceleration_rad_s2(const MbbrReferenceParams& p) { return p.yaw_acceleration_rad_s2(); }
+  static Vec3 told(const MbbrParameters& p, Complex u, double yaw_rate) {
+    return {u.real(), u.imag(), -(p.k2_ball + p.mu_v) / p.k1 * yaw_rate};
   }
-
- private:
-  Controller disturbed_;
-  Controller steady_;
-};
-
-/// The MBBR's tick without friction, bridge and safety.
-template <class Feedback>
-class MbbrController {
- public:
-  MbbrController(const MbbrConfig& config, const typename Feedback::Params& feedback, double yaw_rate_rad_s)
-      : robot_(config.robot),
-        kinematics_(config.robot),
-        estimators_(config.estimators),
-        reference_(config.reference),
-        feedback_(feedback),
-        yaw_step_(config.reference.yaw_acceleration_rad_s2() * kTickS) {
-    for (int k = 0; k < 40; ++k) estimators_.update(sample({}), Vec3::Zero(), true);
-    reference_.reset(estimators_.update(sample({}), Vec3::Zero(), true));
-    command_.arm = true;
-    command_.yaw_rate_rad_s = yaw_rate_rad_s;
-    const int ramp = static_cast<int>(std::ceil(std::abs(yaw_rate_rad_s) / yaw_step_));
-    for (int k = 0; k < ramp + kSettleTicks; ++k) step({}, {});
-  }
-
-  Complex step(const Readings& readings, Complex u_before) {
-    yaw_rate_ += std::clamp(command_.yaw_rate_rad_s - yaw_rate_, -yaw_step_, yaw_step_);
-    heading_ += kTickS * yaw_rate_;
-    const double u_z = -(robot_.k2_ball + robot_.mu_v) / robot_.k1 * yaw_rate_;
-    const MbbrEstimate& x_hat =
-        estimators_.update(sample(readings), Vec3(u_before.real(), u_before.imag(), u_z), false);
-    const Vec3 u = feedback_.update(reference_.update(command_, x_hat));
-    return {u.x(), u.y()};
-  }
-
- private:
-  Mbbr::Sample sample(const Readings& readings) {
-    Mbbr::Sample z;
+  static Complex answer(const Vec3& u) { return {u.x(), u.y()}; }
+  /// All but the wheels' rates.
+  static Mbbr::Sample sample(const MbbrParameters& p, const MbbrKinematics& kinematics,
+                             const Readings& readings, double yaw_rate, double heading) {
     const auto xy = [&readings](Channel c) { return Vec2(readings[c].real(), readings[c].imag()); };
-    z.imu_ok = z.encoders_ok = z.battery_ok = z.attitude_ok = true;
-    z.gyro_B_rad_s << xy(kGyro), yaw_rate_;
-    z.accel_B_m_s2 << yaw_rate_ * yaw_rate_ * robot_.l_a.head<2>() + xy(kAccel), -kGravity_m_s2;
+    Mbbr::Sample z;
+    z.gyro_B_rad_s << xy(kGyro), yaw_rate;
+    z.accel_B_m_s2 << yaw_rate * yaw_rate * p.l_a.head<2>() + xy(kAccel), -kGravity_m_s2;
     Vec3 phi_B;
-    phi_B << xy(kEncoder), -heading_;
-    z.wheel_angle_rad = kinematics_.wheels_from_ball(phi_B);
-    z.wheel_rate_rad_s = rotor_speed_.update(z.wheel_angle_rad);
-    z.attitude_rad << xy(kAttitude), heading_;
+    phi_B << xy(kEncoder), -heading;
+    z.wheel_angle_rad = kinematics.wheels_from_ball(phi_B);
+    z.attitude_rad << xy(kAttitude), heading;
     return z;
   }
-
-  MbbrParameters robot_;
-  MbbrKinematics kinematics_;
-  RotorSpeed<Mbbr::kWheels> rotor_speed_;
-  MbbrEstimators estimators_;
-  MbbrReferenceStage reference_;
-  Feedback feedback_;
-  double yaw_step_;
-  Command command_;
-  double yaw_rate_ = 0.0;
-  double heading_ = 0.0;
 };
 
 /// The MIP's, likewise; real.
-template <class Feedback>
-class MipController {
+struct MipSpin {
+  using Config = MipConfig;
+  using Robot = Mip;
+  using Estimators = MipEstimators;
+  using Reference = MipReferenceStage;
+
+  static double yaw_acceleration_rad_s2(const MipReferenceParams& p) { return p.max_yaw_acceleration_rad_s2; }
+  static Vec2 told(const MipParameters& p, Complex u, double yaw_rate) {
+    return {u.real(), p.yaw_to_wheel() * (p.k2 + p.mu_v) / p.k1 * yaw_rate};
+  }
+  static Complex answer(const Vec2& u) { return {u.x(), 0.0}; }
+  static Mip::Sample sample(const MipParameters& p, const MipKinematics& kinematics, const Readings& readings,
+                            double yaw_rate, double heading) {
+    Mip::Sample z;
+    z.gyro_B_rad_s << readings[kGyro].real(), readings[kGyroAcross].real(), yaw_rate;
+    z.accel_B_m_s2 << 0.0, yaw_rate * yaw_rate * p.l_a.y() + readings[kAccel].real(), -kGravity_m_s2;
+    z.wheel_angle_rad = kinematics.wheels(readings[kEncoder].real(), heading);
+    z.attitude_rad << readings[kAttitude].real(), 0.0, heading;
+    return z;
+  }
+};
+
+template <class Spin, class Feedback>
+class SettledControllerOf : public SettledController {
  public:
-  MipController(const MipConfig& config, const typename Feedback::Params& feedback, double yaw_rate_rad_s)
+  SettledControllerOf(const typename Spin::Config& config, const typename Feedback::Params& feedback,
+                      double yaw_rate_rad_s)
       : robot_(config.robot),
         kinematics_(config.robot),
         estimators_(config.estimators),
         reference_(config.reference),
         feedback_(feedback),
-        yaw_step_(config.reference.max_yaw_acceleration_rad_s2 * kTickS) {
-    for (int k = 0; k < 40; ++k) estimators_.update(sample({}), Vec2::Zero(), true);
-    reference_.reset(estimators_.update(sample({}), Vec2::Zero(), true));
+        yaw_step_(Spin::yaw_acceleration_rad_s2(config.reference) * kTickS) {
+    for (int k = 0; k < 40; ++k) estimators_.update(sample({}), Input::Zero(), true);
+    reference_.reset(estimators_.update(sample({}), Input::Zero(), true));
     command_.arm = true;
     command_.yaw_rate_rad_s = yaw_rate_rad_s;
+    constexpr int kSettleTicks = 1200;  // the filters' gains are steady then
     const int ramp = static_cast<int>(std::ceil(std::abs(yaw_rate_rad_s) / yaw_step_));
     for (int k = 0; k < ramp + kSettleTicks; ++k) step({}, {});
   }
 
-  Complex step(const Readings& readings, Complex u_before) {
+  std::unique_ptr<SettledController> copy() const override {
+    return std::make_unique<SettledControllerOf>(*this);
+  }
+
+  Complex step(const Readings& readings, Complex u_before) override {
     yaw_rate_ += std::clamp(command_.yaw_rate_rad_s - yaw_rate_, -yaw_step_, yaw_step_);
     heading_ += kTickS * yaw_rate_;
-    const double u_z = robot_.yaw_to_wheel() * (robot_.k2 + robot_.mu_v) / robot_.k1 * yaw_rate_;
-    const MipEstimate& x_hat = estimators_.update(sample(readings), Vec2(u_before.real(), u_z), false);
-    return {feedback_.update(reference_.update(command_, x_hat)).x(), 0.0};
+    const auto& x_hat = estimators_.update(sample(readings), Spin::told(robot_, u_before, yaw_rate_), false);
+    return Spin::answer(feedback_.update(reference_.update(command_, x_hat)));
   }
 
  private:
-  Mip::Sample sample(const Readings& readings) {
-    Mip::Sample z;
+  using Robot = typename Spin::Robot;
+  using Input = Vec<Robot::kInputs>;
+
+  typename Robot::Sample sample(const Readings& readings) {
+    typename Robot::Sample z = Spin::sample(robot_, kinematics_, readings, yaw_rate_, heading_);
     z.imu_ok = z.encoders_ok = z.battery_ok = z.attitude_ok = true;
-    z.gyro_B_rad_s << readings[kGyro].real(), readings[kGyroAcross].real(), yaw_rate_;
-    z.accel_B_m_s2 << 0.0, yaw_rate_ * yaw_rate_ * robot_.l_a.y() + readings[kAccel].real(), -kGravity_m_s2;
-    z.wheel_angle_rad = kinematics_.wheels(readings[kEncoder].real(), heading_);
     z.wheel_rate_rad_s = rotor_speed_.update(z.wheel_angle_rad);
-    z.attitude_rad << readings[kAttitude].real(), 0.0, heading_;
     return z;
   }
 
-  MipParameters robot_;
-  MipKinematics kinematics_;
-  RotorSpeed<Mip::kWheels> rotor_speed_;
-  MipEstimators estimators_;
-  MipReferenceStage reference_;
+  typename Robot::Parameters robot_;
+  typename Robot::Kinematics kinematics_;
+  RotorSpeed<Robot::kWheels> rotor_speed_;
+  typename Spin::Estimators estimators_;
+  typename Spin::Reference reference_;
   Feedback feedback_;
   double yaw_step_;
   Command command_;

@@ -18,6 +18,19 @@ Moment moment(double delay_s, double actuation_delay_s) {
   return {static_cast<std::size_t>(ticks), after, after <= actuation_delay_s};
 }
 
+/// Runs beside a twin that gets no disturbance; its answer is the difference.
+class AboutSteadySpin {
+ public:
+  explicit AboutSteadySpin(const SettledController& settled)
+      : disturbed_(settled.copy()), steady_(settled.copy()) {}
+  Complex step(const Readings& readings, Complex u_before) {
+    return disturbed_->step(readings, u_before) - steady_->step({}, {});
+  }
+
+ private:
+  std::unique_ptr<SettledController> disturbed_, steady_;
+};
+
 }  // namespace
 
 std::array<std::vector<Complex>, kSensors> sensor_responses(const Plant& plant,
@@ -84,6 +97,67 @@ void ClosedLoop::read() {
     const Eigen::VectorXcd x = s.A * x_before_[j] + s.B.col(0) * u_new + s.B_late.col(0) * u_old;
     readings_[c] = (plant_.sensors[c].C * x)(0) + plant_.sensors[c].D * (old_input_[c] ? u_old : u_new);
   }
+}
+
+Loop whole_loop(const Plant& plant, const SettledController& settled) {
+  constexpr double kImpulse = 1e-5;
+  constexpr int kTicks = 1600;  // 8 s: what is left then drifts with the integrated position
+  Loop loop;
+  loop.omega_rad_s = frequency_grid(kTickS, 300, plant.centre_rad_s());
+  const std::size_t points = loop.omega_rad_s.size();
+
+  const auto answer = [&](std::size_t channel) {
+    AboutSteadySpin controller(settled);
+    std::vector<Complex> h(kTicks);
+    for (int k = 0; k < kTicks; ++k) {
+      Readings readings{};
+      if (k == 0 && channel < kSensors) readings[channel] = kImpulse;
+      h[static_cast<std::size_t>(k)] =
+          controller.step(readings, k == 0 && channel == kSensors ? kImpulse : 0.0) / kImpulse;
+    }
+    std::vector<Complex> response(points);
+    for (std::size_t i = 0; i < points; ++i) {
+      const Complex back = std::polar(1.0, -loop.omega_rad_s[i] * kTickS);
+      // Horner, from the drifting tail.
+      Complex sum = h.back() / (1.0 - plant.drift * back);
+      for (int k = kTicks - 2; k >= 0; --k) sum = h[static_cast<std::size_t>(k)] + back * sum;
+      response[i] = sum;
+    }
+    return response;
+  };
+  std::array<std::vector<Complex>, kSensors> controller_responses;
+  for (std::size_t c = 0; c < kSensors; ++c) controller_responses[c] = answer(c);
+  const std::vector<Complex> told_response = answer(kSensors);  // to the input the filter is told of
+  const auto plant_responses = sensor_responses(plant, loop.omega_rad_s);
+
+  for (std::size_t i = 0; i < points; ++i) {
+    const Complex back = std::polar(1.0, -loop.omega_rad_s[i] * kTickS);
+    std::array<Complex, kSensors> through{};
+    Complex all{};
+    for (std::size_t c = 0; c < kSensors; ++c) {
+      through[c] = controller_responses[c][i] * plant_responses[c][i];
+      all += through[c];
+    }
+    // The filter is told what was asked for.
+    const Complex rest = 1.0 - told_response[i] * back;
+    loop.at_u.push_back(-all / rest);
+    loop.at_gyro.push_back(-through[kGyro] / (rest - (all - through[kGyro])));
+    loop.at_encoder.push_back(-through[kEncoder] / (rest - (all - through[kEncoder])));
+  }
+
+  constexpr int kStart = 4000;  // 20 s: large robots are slow
+  ClosedLoop closed(plant);
+  AboutSteadySpin controller(settled);
+  Complex u{};
+  double late_tilt = 0.0;
+  const double first_tilt = closed.tilt();
+  for (int k = 0; k < kStart && closed.tilt() < 1e3 * first_tilt; ++k) {
+    u = controller.step(closed.readings(), u);
+    closed.apply(u);
+    if (k > kStart / 2) late_tilt = std::max(late_tilt, closed.tilt());
+  }
+  loop.stable = closed.tilt() < first_tilt && late_tilt < 0.2 * first_tilt;
+  return loop;
 }
 
 }  // namespace equipoise::app

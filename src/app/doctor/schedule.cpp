@@ -38,8 +38,7 @@ int priority_of(const std::string& stat) {
 }
 
 /// "irq/45-4819c000.i2c", of which old kernels keep 15 characters, belongs to one of these.
-template <std::size_t N>
-bool serves(const std::string& comm, const std::array<const char*, N>& devices) {
+bool serves(const std::string& comm, const std::vector<const char*>& devices) {
   const std::size_t dash = comm.find('-');
   if (comm.rfind("irq/", 0) != 0 || dash == std::string::npos) return false;
   const std::string device = comm.substr(dash + 1);
@@ -48,16 +47,16 @@ bool serves(const std::string& comm, const std::array<const char*, N>& devices) 
 
 /// The sample comes through GPIO and I2C2; Ethernet and MMC can wait.
 void examine_irq_threads(const Patient& patient, Findings* findings) {
-  constexpr std::array<const char*, 5> kOurs{"4819c00", "44e0700", "4804c00", "481ac00", "481ae00"};
-  constexpr std::array<const char*, 4> kOthers{"4a10000", "4806000", "481d800", "4781000"};
+  const std::vector<const char*> ours_on{"4819c00", "44e0700", "4804c00", "481ac00", "481ae00"};
+  const std::vector<const char*> others_on{"4a10000", "4806000", "481d800", "4781000"};
   int ours = INT_MAX;
   int others = 0;
   std::string lowest;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(patient.path("/proc"), error)) {
     const std::string comm = first_line(entry.path().string() + "/comm");
-    const bool is_ours = serves(comm, kOurs);
-    if (!is_ours && !serves(comm, kOthers)) continue;
+    const bool is_ours = serves(comm, ours_on);
+    if (!is_ours && !serves(comm, others_on)) continue;
     const int priority = priority_of(first_line(entry.path().string() + "/stat"));
     if (!is_ours) others = std::max(others, priority);
     if (is_ours && priority < ours) {

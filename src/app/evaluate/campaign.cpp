@@ -192,11 +192,12 @@ int campaign(const CampaignArguments& a) {
     robots[static_cast<std::size_t>(r)] = configured(a, a.robot + r);
   });
   const std::vector<Case> all = cases_of(a);
-  const auto outcomes =
-      in_parallel<FaultOutcome>("campaign", all.size(), threads_for(a.jobs), [&](std::size_t i) {
-        const Case& c = all[i];
-        return run_with_fault(*robots[static_cast<std::size_t>(c.robot - a.robot)], choice, c.plan, c.seed);
-      });
+  std::vector<FaultOutcome> outcomes(all.size());
+  in_parallel("campaign", all.size(), threads_for(a.jobs), [&](std::size_t i) {
+    const Case& c = all[i];
+    outcomes[i] =
+        run_with_fault(*robots[static_cast<std::size_t>(c.robot - a.robot)], choice, c.plan, c.seed);
+  });
 
   nlohmann::json cases = nlohmann::json::array();
   int unsafe = 0;

@@ -20,11 +20,6 @@ struct Arguments {
   bool twins = false;
 };
 
-template <class Value>
-void take(const nlohmann::json& row, const char* key, Value* value) {
-  if (row.contains(key)) row.at(key).get_to(*value);
-}
-
 /// A row of the input: its own keys, and the world of robots as built where it names none.
 SimRequest request_of(const Arguments& a, const nlohmann::json& row) {
   static const std::vector<std::string> kKeys{"robot",      "seed",     "yaw_hz",    "drive_mps",
@@ -36,17 +31,14 @@ SimRequest request_of(const Arguments& a, const nlohmann::json& row) {
   SimRequest r;
   r.config = a.config;
   r.set = a.set;
-  r.choice.fidelity = "full";
-  double yaw_hz = 0.0;
-  take(row, "robot", &r.robot);
-  take(row, "seed", &r.seed);
-  take(row, "yaw_hz", &yaw_hz);
-  take(row, "drive_mps", &r.drive_mps);
-  take(row, "duration_s", &r.duration_s);
-  take(row, "fidelity", &r.choice.fidelity);
-  take(row, "estimator", &r.choice.estimator);
-  take(row, "controller", &r.choice.controller);
-  r.yaw_rate_rad_s = 2.0 * kPi * yaw_hz;
+  r.robot = row.value("robot", r.robot);
+  r.seed = row.value("seed", r.seed);
+  r.yaw_rate_rad_s = 2.0 * kPi * row.value("yaw_hz", 0.0);
+  r.drive_mps = row.value("drive_mps", r.drive_mps);
+  r.duration_s = row.value("duration_s", r.duration_s);
+  r.choice.fidelity = row.value("fidelity", "full");
+  r.choice.estimator = row.value("estimator", "");
+  r.choice.controller = row.value("controller", "");
   check(r);
   return r;
 }
@@ -94,8 +86,9 @@ int run_all(const Arguments& a) {
   } catch (const nlohmann::json::exception& error) {
     throw InputError(a.in + ": " + error.what());
   }
-  const auto rows = in_parallel<nlohmann::json>("trials", trials.size(), threads_for(a.jobs),
-                                                [&](std::size_t i) { return run(type, trials[i], a.twins); });
+  std::vector<nlohmann::json> rows(trials.size());
+  in_parallel("trials", trials.size(), threads_for(a.jobs),
+              [&](std::size_t i) { rows[i] = run(type, trials[i], a.twins); });
   write_json({{"robot", type.name}, {"version", version()}, {"trials", rows}}, a.json);
   return 0;
 }

@@ -7,6 +7,7 @@
 
 #include "app/import/regression.hpp"
 #include "app/import/signals.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -14,13 +15,6 @@ namespace {
 constexpr double kRight = 1.4;         // so far off may be a radius, a track, an accelerometer's scale
 constexpr double kRightOfForce = 5.0;  // what the specific force says of small motions, shaken as it is
 constexpr double kNearUnit = 0.2;      // as close to a factor of units is a mistake of units
-
-template <class... A>
-std::string text(const char* format, A... a) {
-  char line[400];
-  std::snprintf(line, sizeof line, format, a...);
-  return line;
-}
 
 double median(Series values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -42,7 +36,7 @@ bool right(double scale, double factor = kRight) { return scale > 1.0 / factor &
 Check check_rows(const Table& table) {
   const std::size_t torn = table.torn_rows;
   return {"rows", torn * 100 <= table.rows(), static_cast<double>(torn),
-          text("%zu rows; %zu with another number of cells are left out", table.rows(), torn)};
+          format("%zu rows; %zu with another number of cells are left out", table.rows(), torn)};
 }
 
 Series steps(const Series& t_s) {
@@ -56,10 +50,10 @@ Check check_clock(const ImportedRows& rows) {
   const double usual = median(dt);
   const double late = *std::max_element(dt.begin(), dt.end());
   Check c{"clock", std::nullopt, 1.0 / usual,
-          text("%.1f rows a second, longest step %.1f ms", 1.0 / usual, 1e3 * late)};
+          format("%.1f rows a second, longest step %.1f ms", 1.0 / usual, 1e3 * late)};
   c.ok = rows.not_advancing == 0 && usual > 1e-5 && usual < 0.1;
   if (rows.not_advancing > 0)
-    c.text += text("; %zu rows whose time does not advance are left out", rows.not_advancing);
+    c.text += format("; %zu rows whose time does not advance are left out", rows.not_advancing);
   if (usual >= 0.1) c.text += "; too slow for balancing: is time.unit ms or us?";
   if (usual <= 1e-5) c.text += "; too fast for a control loop: is time.unit s or ms?";
   return c;
@@ -70,7 +64,7 @@ Check check_gaps(const ImportedRows& rows) {
   const double usual = median(dt);
   const auto gaps =
       std::count_if(dt.begin(), dt.end(), [&](double d) { return d > 2.5 * usual && d > kTickS; });
-  return {"gaps", gaps == 0, static_cast<double>(gaps), text("%td gaps of more than two rows", gaps)};
+  return {"gaps", gaps == 0, static_cast<double>(gaps), format("%td gaps of more than two rows", gaps)};
 }
 
 Check check_repeats(const ImportedRows& rows) {
@@ -79,7 +73,7 @@ Check check_repeats(const ImportedRows& rows) {
     same += rows.gyro_rad_s[k] == rows.gyro_rad_s[k - 1] && rows.accel_m_s2[k] == rows.accel_m_s2[k - 1];
   const double share = static_cast<double>(same) / static_cast<double>(rows.t_s.size() - 1);
   return {"repeats", share < 0.01, share,
-          text("%.1f %% of the IMU's samples repeat the one before", 100.0 * share)};
+          format("%.1f %% of the IMU's samples repeat the one before", 100.0 * share)};
 }
 
 /// At the stated range; without one, an extreme that is taken more often than noise would.
@@ -95,7 +89,7 @@ Check check_clipping(const char* name, const std::vector<Vec3>& values, double r
   }
   const double share = static_cast<double>(clipped) / static_cast<double>(values.size());
   return {name, share < 1e-3, share,
-          text("%.2f %% of the samples are at the end of the range", 100.0 * share)};
+          format("%.2f %% of the samples are at the end of the range", 100.0 * share)};
 }
 
 /// Angles that no motor without load could turn in a row's time.
@@ -114,8 +108,8 @@ Check check_jumps(const ImportedRows& rows, const ImportedRobot& robot) {
   }
   const bool units = jumps > rows.t_s.size() / 10;
   return {"wheel_jumps", jumps == 0, static_cast<double>(jumps),
-          text("%zu steps beyond 1.5 times the no-load speed of %.0f rad/s%s", jumps, fastest / 1.5,
-               units ? ": is wheels.unit right?" : "")};
+          format("%zu steps beyond 1.5 times the no-load speed of %.0f rad/s%s", jumps, fastest / 1.5,
+                 units ? ": is wheels.unit right?" : "")};
 }
 
 Check check_norm(const ImportedRows& rows) {
@@ -123,7 +117,7 @@ Check check_norm(const ImportedRows& rows) {
   for (const Vec3& f : rows.accel_m_s2)
     if (f.allFinite()) norms.push_back(f.norm());
   const double share = norms.empty() ? kNotGiven : median(norms) / kGravity_m_s2;
-  Check c{"accel_norm", right(share), share, text("median %.3f g", share)};
+  Check c{"accel_norm", right(share), share, format("median %.3f g", share)};
   const std::string mistake = units_mistake(share, {{1.0 / kGravity_m_s2, ": accel.unit is g, not m/s2"},
                                                     {kGravity_m_s2, ": accel.unit is m/s2, not g"},
                                                     {1e-3, ": accel.unit is mg, not g"},
@@ -208,7 +202,7 @@ std::vector<Coefficient> against_accel(const Grid& g, const ImportedRobot& robot
 }
 
 std::string shown(const Coefficient& c) {
-  return std::isfinite(c.sigma) ? text("%+.2f +- %.2f", c.value, c.sigma) : "never moved";
+  return std::isfinite(c.sigma) ? format("%+.2f +- %.2f", c.value, c.sigma) : "never moved";
 }
 
 struct Comparison {
@@ -314,7 +308,7 @@ Check check_up(const Grid& g, const ImportMap& map) {
   Check c{"accel_up", std::nullopt, kNotGiven, "no balancing stretch"};
   if (up.empty()) return c;
   c.value = median(up) / kGravity_m_s2;
-  c.text = text("median %.2f g on body z while balancing", c.value);
+  c.text = format("median %.2f g on body z while balancing", c.value);
   if (map.balancing.empty() && std::abs(c.value) < 0.5) return c;
   c.ok = c.value > 0.5;
   if (!*c.ok) c.text += c.value < -0.5 ? ": accel z is flipped" : ": the axes are not the body's";

@@ -27,26 +27,37 @@ struct ConvertArguments {
 };
 
 /// Shortest text that reads back as the same number.
-template <class Number>
-void append_number(Number value, std::string* to) {
-  char text[40];
-  const auto end = std::to_chars(std::begin(text), std::end(text), value);
-  to->append(text, end.ptr);
-}
-void append_number(bool value, std::string* to) { *to += value ? '1' : '0'; }
+constexpr auto text_of = [](auto value) -> std::string {
+  if constexpr (std::is_same_v<decltype(value), bool>) {
+    return value ? "1" : "0";
+  } else {
+    char text[40];
+    return {text, std::to_chars(std::begin(text), std::end(text), value).ptr};
+  }
+};
 
-/// number(field, unit, value) for each number of a message's fields; field_0, field_1, ... of an array.
-template <class Message, class Record, class Number>
-void each_number(Message, const Record& record, Number&& number) {
+struct Number {
+  std::string name;  // field, or field_0, field_1, ... of an array
+  const char* unit;
+  std::string text;
+  bool finite;
+};
+
+template <class Message, class Record>
+std::vector<Number> numbers_of(Message, const Record& record) {
+  std::vector<Number> numbers;
+  const auto add = [&](std::string name, const char* unit, auto value) {
+    numbers.push_back({std::move(name), unit, text_of(value), std::isfinite(static_cast<double>(value))});
+  };
   Message::visit(record, [&](const char* name, const char* unit, const auto& value) {
-    using Value = std::decay_t<decltype(value)>;
-    if constexpr (std::is_arithmetic_v<Value>) {
-      number(std::string(name), unit, value);
+    if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
+      add(name, unit, value);
     } else {
       std::size_t i = 0;
-      for (const auto& element : value) number(std::string(name) + "_" + std::to_string(i++), unit, element);
+      for (const auto& element : value) add(std::string(name) + "_" + std::to_string(i++), unit, element);
     }
   });
+  return numbers;
 }
 
 /// Which channels a log has, in alphabetical order.
@@ -72,18 +83,16 @@ class CsvRows {
 
   std::string head() const {
     std::string line = "t_s,tick";
-    const auto name = [&line](const std::string& channel) {
-      return [&line, channel](const std::string& field, const char*, auto) {
-        line += "," + channel + "." + field;
-      };
+    const auto add = [&line](const std::string& channel, const std::vector<Number>& numbers) {
+      for (const Number& n : numbers) line += "," + channel + "." + n.name;
     };
     const TickRecord none{};
     fields::each_message(none, [&](auto message, const char* channel, const auto& record) {
-      each_number(message, record, name(short_name(channel)));
+      add(short_name(channel), numbers_of(message, record));
     });
-    if (has_truth_) each_number(fields::State{}, none.truth, name("truth"));
+    if (has_truth_) add("truth", numbers_of(fields::State{}, none.truth));
     for (const std::string& estimator : estimators_)
-      each_number(fields::State{}, none.estimate, name("state_" + estimator));
+      add("state_" + estimator, numbers_of(fields::State{}, none.estimate));
     return line + "\n";
   }
 
@@ -93,27 +102,27 @@ class CsvRows {
     std::snprintf(time, sizeof time, "%.6f", static_cast<double>(tick.now_ns) * 1e-9);
     row_ += time;
     row_ += ',';
-    append_number(tick.tick, &row_);
-    fields::each_message(
-        tick, [&](auto message, const char*, const auto& record) { cells(message, record, true); });
-    if (has_truth_) cells(fields::State{}, tick.truth, tick.has_truth);
+    row_ += text_of(tick.tick);
+    fields::each_message(tick, [&](auto message, const char*, const auto& record) {
+      cells(numbers_of(message, record), true);
+    });
+    if (has_truth_) cells(numbers_of(fields::State{}, tick.truth), tick.has_truth);
     for (const std::string& estimator : estimators_) {
       const auto found = std::find(others.begin(), others.end(), estimator);
       const auto i = static_cast<std::size_t>(found - others.begin());
       const bool has = found != others.end() && (tick.compared & (1U << i)) != 0;
-      cells(fields::State{}, tick.others[has ? i : 0], has);
+      cells(numbers_of(fields::State{}, tick.others[has ? i : 0]), has);
     }
     row_ += '\n';
     return row_;
   }
 
  private:
-  template <class Message, class Record>
-  void cells(Message message, const Record& record, bool has) {
-    each_number(message, record, [this, has](const std::string&, const char*, auto value) {
+  void cells(const std::vector<Number>& numbers, bool has) {
+    for (const Number& n : numbers) {
       row_ += ',';
-      if (has) append_number(value, &row_);
-    });
+      if (has) row_ += n.text;
+    }
   }
 
   bool has_truth_ = false;
@@ -140,7 +149,7 @@ class McapMessages {
     std::map<std::string, std::string> entries;
     fields::Run::visit(run, [&](const char* name, const char*, const auto& value) {
       if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
-        append_number(value, &entries[name]);
+        entries[name] = text_of(value);
       } else {
         entries[name] = value;
       }
@@ -151,45 +160,40 @@ class McapMessages {
   void event(const LogEvent& event) {
     const bool state =
         event.channel == fields::kTruthChannel || event.channel.rfind(fields::kComparedChannel, 0) == 0;
-    if (state) message(fields::State{}, event, &tick_.truth);
-    if (event.channel == fields::kHistogramChannel) message(fields::Histogram{}, event, &histogram_);
-    if (event.channel == fields::kEndChannel) message(fields::End{}, event, &end_);
+    const auto take = [&](auto type, auto& record) {
+      std::int64_t utime = 0;
+      std::int64_t tick = 0;
+      if (runtime::decode(type, event.data, &record, &utime, &tick))
+        message(event, utime, tick, numbers_of(type, record));
+    };
+    if (state) take(fields::State{}, tick_.truth);
+    if (event.channel == fields::kHistogramChannel) take(fields::Histogram{}, histogram_);
+    if (event.channel == fields::kEndChannel) take(fields::End{}, end_);
     fields::each_message(tick_, [&](auto type, std::string_view channel, auto& record) {
-      if (channel == event.channel) message(type, event, &record);
+      if (channel == event.channel) take(type, record);
     });
   }
 
   void finish() { mcap_.finish(); }
 
  private:
-  template <class Message, class Record>
-  void message(Message type, const LogEvent& event, Record* record) {
-    std::int64_t utime = 0;
-    std::int64_t tick = 0;
-    if (!runtime::decode(type, event.data, record, &utime, &tick)) return;
-    json_ = "{\"tick\":";
-    append_number(tick, &json_);
-    each_number(type, *record, [this](const std::string& field, const char*, auto value) {
-      json_ += ",\"" + field + "\":";
-      if (std::isfinite(static_cast<double>(value))) {
-        append_number(value, &json_);
-      } else {
-        json_ += "null";  // JSON knows no other word for it
-      }
-    });
+  void message(const LogEvent& event, std::int64_t utime, std::int64_t tick,
+               const std::vector<Number>& numbers) {
+    json_ = "{\"tick\":" + text_of(tick);
+    for (const Number& n : numbers)
+      json_ += ",\"" + n.name + "\":" + (n.finite ? n.text : "null");  // JSON knows no other word for it
     json_ += '}';
-    mcap_.message(channel(type, event.channel, *record), utime * 1000, json_);
+    mcap_.message(channel(event.channel, numbers), utime * 1000, json_);
   }
 
-  template <class Message, class Record>
-  std::uint16_t channel(Message type, std::string_view name, const Record& record) {
+  std::uint16_t channel(std::string_view name, const std::vector<Number>& numbers) {
     const auto known = channels_.find(name);
     if (known != channels_.end()) return known->second;
     nlohmann::json schema = {{"type", "object"}, {"properties", {{"tick", {{"type", "integer"}}}}}};
-    each_number(type, record, [&](const std::string& field, const char* unit, auto) {
-      schema["properties"][field] = {{"type", "number"}};
-      if (*unit != '\0') schema["properties"][field]["description"] = unit;
-    });
+    for (const Number& n : numbers) {
+      schema["properties"][n.name] = {{"type", "number"}};
+      if (*n.unit != '\0') schema["properties"][n.name]["description"] = n.unit;
+    }
     const std::uint16_t id = mcap_.add_channel("equipoise/" + short_name(name), schema.dump());
     channels_.emplace(name, id);
     return id;

@@ -29,20 +29,19 @@ enum Opcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-template <class Integer>
-std::string little_endian(Integer value) {
-  std::string bytes;
-  for (std::size_t i = 0; i < sizeof value; ++i)
-    bytes += static_cast<char>(static_cast<std::uint64_t>(value) >> (8U * i) & 0xFFU);
-  return bytes;
+std::string little_endian(std::uint64_t value, std::size_t bytes) {
+  std::string text;
+  for (std::size_t i = 0; i < bytes; ++i) text += static_cast<char>(value >> (8U * i) & 0xFFU);
+  return text;
 }
+std::string u16(std::uint64_t value) { return little_endian(value, 2); }
+std::string u32(std::uint64_t value) { return little_endian(value, 4); }
+std::string u64(std::uint64_t value) { return little_endian(value, 8); }
 
-std::string sized(const std::string& bytes) {
-  return little_endian(static_cast<std::uint32_t>(bytes.size())) + bytes;
-}
+std::string sized(const std::string& bytes) { return u32(bytes.size()) + bytes; }
 
 std::string whole_record(std::uint8_t opcode, const std::string& content) {
-  return static_cast<char>(opcode) + little_endian(static_cast<std::uint64_t>(content.size())) + content;
+  return static_cast<char>(opcode) + u64(content.size()) + content;
 }
 
 /// CRC-32 as in zlib.
@@ -92,16 +91,14 @@ void McapWriter::metadata(const std::string& name, const std::map<std::string, s
   for (const auto& [key, value] : entries) map += sized(key) + sized(value);
   const std::uint64_t start = position_;
   record(kMetadata, sized(name) + sized(map));
-  metadata_indexes_.push_back(little_endian(start) + little_endian(position_ - start) + sized(name));
+  metadata_indexes_.push_back(u64(start) + u64(position_ - start) + sized(name));
 }
 
 std::uint16_t McapWriter::add_channel(const std::string& topic, const std::string& schema) {
   const auto id = static_cast<std::uint16_t>(channels_.size() + 1);
   Channel channel;
-  channel.schema_record =
-      whole_record(kSchema, little_endian(id) + sized(topic) + sized("jsonschema") + sized(schema));
-  channel.record = whole_record(
-      kChannel, little_endian(id) + little_endian(id) + sized(topic) + sized("json") + sized(""));
+  channel.schema_record = whole_record(kSchema, u16(id) + sized(topic) + sized("jsonschema") + sized(schema));
+  channel.record = whole_record(kChannel, u16(id) + u16(id) + sized(topic) + sized("json") + sized(""));
   chunk_.records += channel.schema_record + channel.record;
   channels_.push_back(channel);
   return id;
@@ -114,8 +111,7 @@ void McapWriter::message(std::uint16_t channel, std::int64_t t_ns, const std::st
   chunk_.from_ns = std::min(chunk_.from_ns, time);
   chunk_.to_ns = std::max(chunk_.to_ns, time);
   chunk_.index[channel].emplace_back(time, chunk_.records.size());
-  chunk_.records += whole_record(kMessage, little_endian(channel) + little_endian(c.sequence++) +
-                                               little_endian(time) + little_endian(time) + json);
+  chunk_.records += whole_record(kMessage, u16(channel) + u32(c.sequence++) + u64(time) + u64(time) + json);
   ++c.messages;
   if (chunk_.records.size() >= kChunkBytes) end_chunk();
 }
@@ -128,24 +124,22 @@ void McapWriter::end_chunk() {
 
   const std::string packed = compressed(chunk_.records);
   const std::uint64_t start = position_;
-  const std::string sizes = little_endian(static_cast<std::uint64_t>(chunk_.records.size()));
-  record(kChunk, little_endian(chunk_.from_ns) + little_endian(chunk_.to_ns) + sizes +
-                     little_endian(crc32(chunk_.records)) + sized("zstd") +
-                     little_endian(static_cast<std::uint64_t>(packed.size())) + packed);
+  const std::string sizes = u64(chunk_.records.size());
+  record(kChunk, u64(chunk_.from_ns) + u64(chunk_.to_ns) + sizes + u32(crc32(chunk_.records)) +
+                     sized("zstd") + u64(packed.size()) + packed);
   const std::uint64_t length = position_ - start;
 
   std::string offsets;  // of each channel's message index
   const std::uint64_t index_start = position_;
   for (const auto& [channel, entries] : chunk_.index) {
-    offsets += little_endian(channel) + little_endian(position_);
+    offsets += u16(channel) + u64(position_);
     std::string rows;
-    for (const auto& [time, offset] : entries) rows += little_endian(time) + little_endian(offset);
-    record(kMessageIndex, little_endian(channel) + sized(rows));
+    for (const auto& [time, offset] : entries) rows += u64(time) + u64(offset);
+    record(kMessageIndex, u16(channel) + sized(rows));
   }
-  chunk_indexes_.push_back(little_endian(chunk_.from_ns) + little_endian(chunk_.to_ns) +
-                           little_endian(start) + little_endian(length) + sized(offsets) +
-                           little_endian(position_ - index_start) + sized("zstd") +
-                           little_endian(static_cast<std::uint64_t>(packed.size())) + sizes);
+  chunk_indexes_.push_back(u64(chunk_.from_ns) + u64(chunk_.to_ns) + u64(start) + u64(length) +
+                           sized(offsets) + u64(position_ - index_start) + sized("zstd") +
+                           u64(packed.size()) + sizes);
   chunk_ = Chunk{};
 }
 
@@ -154,26 +148,24 @@ std::string McapWriter::statistics() const {
   std::string counts;
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     messages += channels_[i].messages;
-    counts += little_endian(static_cast<std::uint16_t>(i + 1)) + little_endian(channels_[i].messages);
+    counts += u16(i + 1) + u64(channels_[i].messages);
   }
-  const auto count = [](std::size_t n) { return little_endian(static_cast<std::uint32_t>(n)); };
-  return little_endian(messages) + little_endian(static_cast<std::uint16_t>(channels_.size())) +
-         count(channels_.size()) + count(0) + count(metadata_indexes_.size()) + count(chunk_indexes_.size()) +
-         little_endian(from_ns_) + little_endian(to_ns_) + sized(counts);
+  return u64(messages) + u16(channels_.size()) + u32(channels_.size()) + u32(0) +
+         u32(metadata_indexes_.size()) + u32(chunk_indexes_.size()) + u64(from_ns_) + u64(to_ns_) +
+         sized(counts);
 }
 
 void McapWriter::finish() {
   end_chunk();
-  record(kDataEnd, little_endian(std::uint32_t{0}));
+  record(kDataEnd, u32(0));
 
   const std::uint64_t summary_start = position_;
   std::string offsets;
   std::string summary;
   const auto group = [&](std::uint8_t opcode, const std::string& records) {
     if (records.empty()) return;
-    offsets += whole_record(kSummaryOffset, static_cast<char>(opcode) +
-                                                little_endian(summary_start + summary.size()) +
-                                                little_endian(static_cast<std::uint64_t>(records.size())));
+    offsets += whole_record(kSummaryOffset, static_cast<char>(opcode) + u64(summary_start + summary.size()) +
+                                                u64(records.size()));
     summary += records;
   };
   const auto all = [](std::uint8_t opcode, const std::vector<std::string>& contents) {
@@ -194,11 +186,11 @@ void McapWriter::finish() {
   group(kChunkIndex, all(kChunkIndex, chunk_indexes_));
 
   const std::uint64_t offset_start = summary_start + summary.size();
-  const std::string footer = little_endian(summary_start) + little_endian(offset_start);
+  const std::string footer = u64(summary_start) + u64(offset_start);
   // The sum covers the summary up to itself, the footer's head included.
-  const std::string head = static_cast<char>(kFooter) + little_endian(std::uint64_t{20}) + footer;
+  const std::string head = static_cast<char>(kFooter) + u64(20) + footer;
   const std::string covered = summary + offsets + head;
-  write(covered + little_endian(crc32(covered)));
+  write(covered + u32(crc32(covered)));
   write(std::string(kMagic));
 }
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <numeric>
 
-#include "app/log/shadow_as.hpp"
+#include "app/log/shadow_run.hpp"
 #include "app/text/errors.hpp"
 #include "robots/robot_list.hpp"
 
@@ -106,8 +106,26 @@ Shadow shadow_log(RunLog& log, const std::string& origin, const std::string& con
     throw InputError(config + ": is of a robot of type " + robot_type(config) + ", the log of " +
                      log.run().robot);
   }
-  return with_robot(log.run().robot, origin,
-                    [&](auto firmware) { return shadow_as<decltype(firmware)>(log, origin, config, set); });
+  const runtime::RunInfo& info = log.run();
+  return with_robot(info.robot, origin, [&](auto robot) {
+    using Robot = decltype(robot);
+    const auto loaded = config.empty() ? Robot::parse(info.config_toml, origin + " (its configuration)", set)
+                                       : Robot::load(config, set);
+    Choice choice{"", "", info.backend == "import" ? "" : info.fidelity, false, "", ""};
+    complete(type_as<Robot>(), &choice);
+    const auto c = Robot::apply(loaded.config, choice);
+    Shadow out = Robot::with_pipeline(c, choice.controller, [&](auto& pipeline) {
+      return ShadowRun<std::decay_t<decltype(pipeline)>>(pipeline.params(), Robot::rolling_radius_m(c),
+                                                         c.robot.l_a.z(), shadow_ticks(log))
+          .run();
+    });
+    const WorldParams& world = c.world[fidelity_level("full")].common;
+    for (const std::string axis : {"x", "y", "z"}) {
+      out.configured["gyro_" + axis + "_rad_s"] = world.gyro_sigma_rad_s;
+      out.configured["accel_" + axis + "_m_s2"] = world.accel_sigma_m_s2;
+    }
+    return out;
+  });
 }
 
 }  // namespace equipoise::app

@@ -1,5 +1,5 @@
 // What shadow runs ask of each robot's default filter: names of its rows, its model's step, the angles that
-// it predicts. Included by shadow_as.hpp only.
+// it predicts. Included by shadow_run.hpp only.
 #pragma once
 
 #include <array>
@@ -9,17 +9,13 @@
 
 namespace equipoise::app {
 
-template <class Robot>
-struct ShadowModel;
-
-template <>
-struct ShadowModel<Mip> {
+struct MipShadowModel {
   static constexpr std::array<const char*, 6> kRows{"gyro_x",  "gyro_y",  "gyro_z",
                                                     "wheel_1", "wheel_2", "accel_y"};
   static constexpr int kAxes = 1;  // tilt and rolling, about x and y
   using Motion = MipEkfModel::Motion;
 
-  explicit ShadowModel(const MipEstimatorParams& p)
+  explicit MipShadowModel(const MipEstimatorParams& p)
       : model(p.robot, p.ekf.options, p.ekf.disturbance_time_constant_s),
         kinematics(p.robot),
         keep(std::exp(-kTickS / p.ekf.disturbance_time_constant_s)) {}
@@ -40,15 +36,14 @@ struct ShadowModel<Mip> {
   double keep;
 };
 
-template <>
-struct ShadowModel<Mbbr> {
+struct MbbrShadowModel {
   static constexpr std::array<const char*, 8> kRows{"gyro_x",  "gyro_y",  "gyro_z",  "wheel_1",
                                                     "wheel_2", "wheel_3", "accel_x", "accel_y"};
   static constexpr int kAxes = 2;
   using Observable = MbbrObservable;
   using Motion = Observable::State;
 
-  explicit ShadowModel(const MbbrEstimatorParams& p)
+  explicit MbbrShadowModel(const MbbrEstimatorParams& p)
       : model(p.robot, p.ekf.disturbance_time_constant_s),
         kinematics(p.robot),
         keep(std::exp(-kTickS / p.ekf.disturbance_time_constant_s)) {}
@@ -72,5 +67,8 @@ struct ShadowModel<Mbbr> {
   MbbrKinematics kinematics;
   double keep;
 };
+
+inline MipShadowModel shadow_model(const MipEstimatorParams& p) { return MipShadowModel(p); }
+inline MbbrShadowModel shadow_model(const MbbrEstimatorParams& p) { return MbbrShadowModel(p); }
 
 }  // namespace equipoise::app

@@ -72,9 +72,10 @@ void read_frames(Section s, RemoteFile* out) {
   s.finish();
 }
 
-template <class Bindings>
-bool binds(const Bindings& bindings, HandAction action) {
-  return std::any_of(bindings.begin(), bindings.end(), [&](const auto& b) { return b.action == action; });
+bool binds(const RemoteFile& file, HandAction action) {
+  const auto is = [&](const auto& binding) { return binding.action == action; };
+  return std::any_of(file.frames.begin(), file.frames.end(), is) ||
+         std::any_of(file.events.begin(), file.events.end(), is);
 }
 
 RemoteFile read_remote(const Document& document) {
@@ -95,10 +96,7 @@ RemoteFile read_remote(const Document& document) {
   } else {
     read_events(root.table("events"), &out);
   }
-  const bool arms = frames ? binds(out.frames, HandAction::kArm) : binds(out.events, HandAction::kArm);
-  const bool disarms =
-      frames ? binds(out.frames, HandAction::kDisarm) : binds(out.events, HandAction::kDisarm);
-  if (!arms || !disarms)
+  if (!binds(out, HandAction::kArm) || !binds(out, HandAction::kDisarm))
     root.fail(frames ? "frames" : "events", "needs arm and disarm: who starts motors can stop them");
   root.finish();
   return out;

@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "app/cli/interrupt.hpp"
-#include "app/cli/key_file.hpp"
 #include "app/run/wires.hpp"
 
 namespace equipoise::app {
@@ -42,7 +41,7 @@ Conversation::Conversation(const SendArguments& a, const runtime::CommandKeys& k
       awake_(process_start() +
              std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
                  std::max(0.0, a.timeout_s - kStopped_s)))),  // a busy machine starts it late
-      sender_(as_input([&] { return runtime::CommandSender(keys, a.robot, a.holder); })),
+      sender_(keys, a.robot, a.holder),
       robot_(a.robot.empty() ? keys.robot() : a.robot),
       wire_(open_wire(a.url, runtime::WireSide::kOwner)) {}
 

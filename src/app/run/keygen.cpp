@@ -2,7 +2,6 @@
 #include <cstdio>
 
 #include "app/cli/commands.hpp"
-#include "app/cli/key_file.hpp"
 
 namespace equipoise::app {
 
@@ -29,15 +28,13 @@ void add_keygen(Subcommand app) {
   holder.needs(from).excludes(robot);
   rotate.excludes(robot).excludes(holder);
   command.action([=] {
-    as_input([&] {
-      if (a->rotate) {
-        runtime::CommandKeys::rotate(a->path);
-      } else if (!a->holder.empty()) {
-        runtime::CommandKeys::load(a->from).of_holder(a->holder).save(a->path);
-      } else {
-        runtime::CommandKeys::create(a->path, a->robot);
-      }
-    });
+    if (a->rotate) {
+      runtime::CommandKeys::rotate(a->path);
+    } else if (!a->holder.empty()) {
+      runtime::CommandKeys::load(a->from).of_holder(a->holder).save(a->path);
+    } else {
+      runtime::CommandKeys::create(a->path, a->robot);
+    }
     std::printf("%s\n", a->path.c_str());
     return 0;
   });

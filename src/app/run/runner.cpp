@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "app/cli/interrupt.hpp"
-#include "app/cli/key_file.hpp"
 #include "app/guard/service_notify.hpp"
 #include "app/io/hardware.hpp"
 #include "app/remote/hand_remote.hpp"
@@ -24,6 +23,14 @@ std::string numbered(const std::string& path, int trial) {
       .string();
 }
 
+/// From which those of every holder can be had.
+runtime::CommandKeys robot_key(const std::string& path) {
+  runtime::CommandKeys keys = runtime::CommandKeys::load(path);
+  if (!keys.holder().empty())
+    throw InputError(path + ": is " + keys.holder() + "'s key; the robot needs its own");
+  return keys;
+}
+
 }  // namespace
 
 Runner::Runner(const RunArguments& a, const RobotType& robot, const Overrides& overrides,
@@ -35,7 +42,7 @@ Runner::Runner(const RunArguments& a, const RobotType& robot, const Overrides& o
   script_.arm = a.arm;
   if (!a.command_key.empty()) {
     remote_ = std::make_unique<runtime::CommandReceiver>(
-        load_robot_key(a.command_key),
+        robot_key(a.command_key),
         runtime::CommandReceiverOptions{a.robot_name, robot_->safety.command_timeout_s, journal},
         open_wire(a.command_url, runtime::WireSide::kRobot));
   } else if (!a.remote.empty()) {

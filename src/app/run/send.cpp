@@ -5,7 +5,6 @@
 
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
-#include "app/cli/key_file.hpp"
 #include "app/run/conversation.hpp"
 #include "app/run/wires.hpp"
 
@@ -13,7 +12,7 @@ namespace equipoise::app {
 namespace {
 
 int send(const SendArguments& a) {
-  Conversation conversation(a, load_key(a.key));
+  Conversation conversation(a, runtime::CommandKeys::load(a.key));
   watch_interrupts();
   conversation.find_robots();
   if (a.live) {

@@ -99,8 +99,7 @@ class Workers {
   /// robots comes back soon.
   static constexpr std::chrono::microseconds kAwake{200};
 
-  template <class Condition>
-  static bool soon(const Condition& condition) {
+  static bool soon(const std::function<bool()>& condition) {
     if (condition()) return true;
     for (const auto end = Clock::now() + kAwake; Clock::now() < end;) {
       std::this_thread::yield();

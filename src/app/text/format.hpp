@@ -1,15 +1,18 @@
-// Text as printf makes it, of up to 239 characters.
+// Text as printf makes it, of up to 399 characters.
 #pragma once
 
+#include <cstdarg>
 #include <cstdio>
 #include <string>
 
 namespace equipoise::app {
 
-template <class... Args>
-std::string format(const char* text, Args... args) {
-  char out[240];
-  std::snprintf(out, sizeof out, text, args...);
+[[gnu::format(printf, 1, 2)]] inline std::string format(const char* text, ...) {
+  char out[400];
+  std::va_list arguments;
+  va_start(arguments, text);
+  (void)std::vsnprintf(out, sizeof out, text, arguments);
+  va_end(arguments);
   return out;
 }
 

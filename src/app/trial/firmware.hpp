@@ -12,7 +12,7 @@
 #include "equipoise/overrides.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/sense/calibrate.hpp"
-#include "robots/choice.hpp"
+#include "robots/common/choice.hpp"
 
 namespace equipoise::app {
 

@@ -37,10 +37,21 @@ class WorldOf : public World {
 template <class Robot, class Pipeline, class Simulated = typename Robot::World>
 class FirmwareOf : public Firmware {
  public:
+  /// What the estimators of a tick are given beside its samples.
+  struct Given {
+    typename Pipeline::Input u;
+    bool held;
+  };
+
   explicit FirmwareOf(const typename Pipeline::Params& params) : pipeline_(params) {}
+  /// Its estimators take what those of another, which ticks first, were given.
+  FirmwareOf(const typename Pipeline::Params& params, const FirmwareOf& leader)
+      : pipeline_(params), leader_(&leader) {}
 
   runtime::TickRecord tick(const RawSample& raw, const Command& asked,
                            const LoopState& loop) noexcept override {
+    if (leader_ != nullptr) pipeline_.applied(leader_->given_.u, leader_->given_.held);
+    given_ = {pipeline_.applied(), pipeline_.held()};
     runtime::TickRecord record{};
     record.now_ns = loop.now_ns;
     record.raw = raw;
@@ -104,50 +115,8 @@ class FirmwareOf : public Firmware {
   }
 
   Pipeline pipeline_;
-};
-
-/// What the estimators of a tick are given beside its samples.
-template <class P>
-struct GivenInput {
-  typename P::Input u;
-  bool held;
-};
-
-/// Leaves what its estimators are given.
-template <class Robot, class P>
-class LeaderOf : public FirmwareOf<Robot, P> {
- public:
-  LeaderOf(const typename P::Params& params, std::shared_ptr<GivenInput<P>> given)
-      : FirmwareOf<Robot, P>(params), given_(std::move(given)) {}
-  runtime::TickRecord tick(const RawSample& raw, const Command& asked,
-                           const LoopState& loop) noexcept override {
-    *given_ = {this->pipeline().applied(), this->pipeline().held()};
-    return FirmwareOf<Robot, P>::tick(raw, asked, loop);
-  }
-
- private:
-  std::shared_ptr<GivenInput<P>> given_;
-};
-
-/// Takes it: what it asks of the motors happens nowhere.
-template <class Robot, class P>
-class FollowerOf : public FirmwareOf<Robot, P> {
- public:
-  FollowerOf(typename P::Params params, std::shared_ptr<const GivenInput<P>> given)
-      : FirmwareOf<Robot, P>(unanswered(std::move(params))), given_(std::move(given)) {}
-  runtime::TickRecord tick(const RawSample& raw, const Command& asked,
-                           const LoopState& loop) noexcept override {
-    this->pipeline().applied(given_->u, given_->held);
-    return FirmwareOf<Robot, P>::tick(raw, asked, loop);
-  }
-
- private:
-  /// No encoder could answer what shakes the wheels.
-  static typename P::Params unanswered(typename P::Params p) {
-    p.safety.encoder_check_drive = 0.0;
-    return p;
-  }
-  std::shared_ptr<const GivenInput<P>> given_;
+  const FirmwareOf* leader_ = nullptr;
+  Given given_{};
 };
 
 template <class Robot>
@@ -182,23 +151,20 @@ class ConfiguredRobotOf : public ConfiguredRobot {
     return Robot::with_pipeline(Robot::apply(config, choice), choice.controller, [&](auto& own) {
       using Own = std::decay_t<decltype(own)>;
       return Robot::with_pipeline(other, choice.controller, [&](auto& another) -> Retuning {
-        if constexpr (std::is_same_v<std::decay_t<decltype(another)>, Own>)
-          return retuning_of<Own>(own.params(), another.params());
-        else
+        if constexpr (std::is_same_v<std::decay_t<decltype(another)>, Own>) {
+          auto params = another.params();
+          params.safety.encoder_check_drive = 0.0;  // no encoder could answer what shakes the wheels
+          auto recorded = std::make_unique<FirmwareOf<Robot, Own>>(own.params());
+          auto follower = std::make_unique<FirmwareOf<Robot, Own>>(params, *recorded);
+          return {std::move(recorded), std::move(follower)};
+        } else {
           return {};  // one controller is one type
+        }
       });
     });
   }
 
   typename Robot::Config config;
-
- private:
-  template <class P>
-  static Retuning retuning_of(const typename P::Params& recorded, const typename P::Params& changed) {
-    const auto given = std::make_shared<GivenInput<P>>();
-    return {std::make_unique<LeaderOf<Robot, P>>(recorded, given),
-            std::make_unique<FollowerOf<Robot, P>>(changed, given)};
-  }
 };
 
 /// The robot's entry in the list of types.

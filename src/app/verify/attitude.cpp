@@ -28,11 +28,11 @@ void add_attitude(Subcommand app) {
     params.accel_time_constant_s = *average_s;
     AttitudeFilter filter(params);
     const auto step = [&](const nlohmann::json& row) -> nlohmann::json {
-      filter.update(vector_at<3>(row, "gyro_rad_s"), vector_at<3>(row, "accel_m_s2"));
-      if (row.contains("mag")) filter.update_magnetometer(vector_at<3>(row, "mag"));
+      filter.update(numbers_at(row, "gyro_rad_s", 3), numbers_at(row, "accel_m_s2", 3));
+      if (row.contains("mag")) filter.update_magnetometer(numbers_at(row, "mag", 3));
       const Eigen::Quaterniond q = filter.q_EB();
       return {{"q_wxyz", {q.w(), q.x(), q.y(), q.z()}},
-              {"gyro_bias_rad_s", array_of<3>(filter.gyro_bias_B_rad_s())}};
+              {"gyro_bias_rad_s", array_of(filter.gyro_bias_B_rad_s())}};
     };
     write_json(map_rows(*in, step), *json);
     return 0;

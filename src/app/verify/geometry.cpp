@@ -23,7 +23,7 @@ void add_geometry(Subcommand app) {
     const double beta = orthogonal_beta_rad(alpha);
     const Mat3 T_ob = wheel_axes(alpha, beta, *azimuth_deg * degrees);
     nlohmann::json matrix = nlohmann::json::array();
-    for (int i = 0; i < 3; ++i) matrix.push_back(array_of<3>(T_ob.row(i).transpose()));
+    for (int i = 0; i < 3; ++i) matrix.push_back(array_of(T_ob.row(i).transpose()));
     const double yaw_share = T_ob(2, 0);
     const nlohmann::json result{{"alpha_deg", *alpha_deg},
                                 {"beta_deg", beta / degrees},

@@ -9,21 +9,21 @@ namespace equipoise::app {
 namespace {
 
 nlohmann::json evaluate_mbbr(const MbbrDynamics& dynamics, const nlohmann::json& row) {
-  const Vec2 theta_xy = vector_at<2>(row, "theta_xy");
-  const Vec3 theta_dot = vector_at<3>(row, "theta_dot");
-  const Vec3 tau_B = vector_at<3>(row, "tau_B");
-  const MbbrMotion m(theta_xy, body_rates(theta_xy, theta_dot), vector_at<2>(row, "phi_star_dot"));
+  const Vec2 theta_xy = numbers_at(row, "theta_xy", 2);
+  const Vec3 theta_dot = numbers_at(row, "theta_dot", 3);
+  const Vec3 tau_B = numbers_at(row, "tau_B", 3);
+  const MbbrMotion m(theta_xy, body_rates(theta_xy, theta_dot), numbers_at(row, "phi_star_dot", 2));
   const MbbrAccelerations a = dynamics.accelerations(m, tau_B);
   Vec<5> qdd;
   qdd << MbbrDynamics::theta_ddot(m, a), MbbrDynamics::phi_star_ddot(m, a);
-  return {{"theta_xy", array_of<2>(theta_xy)},
-          {"theta_dot", array_of<3>(theta_dot)},
-          {"phi_star_dot", array_of<2>(m.phi_dot_star)},
-          {"tau_B", array_of<3>(tau_B)},
-          {"qdd", array_of<5>(qdd)},
-          {"gyro_B", array_of<3>(m.omega_B)},
-          {"encoder_rate_B", array_of<3>(MbbrDynamics::encoder_rate_B(m))},
-          {"accel_B", array_of<3>(dynamics.accelerometer_B(m, a))}};
+  return {{"theta_xy", array_of(theta_xy)},
+          {"theta_dot", array_of(theta_dot)},
+          {"phi_star_dot", array_of(m.phi_dot_star)},
+          {"tau_B", array_of(tau_B)},
+          {"qdd", array_of(qdd)},
+          {"gyro_B", array_of(m.omega_B)},
+          {"encoder_rate_B", array_of(MbbrDynamics::encoder_rate_B(m))},
+          {"accel_B", array_of(dynamics.accelerometer_B(m, a))}};
 }
 
 nlohmann::json evaluate_mip(const MipDynamics& dynamics, const nlohmann::json& row) {
@@ -35,14 +35,10 @@ nlohmann::json evaluate_mip(const MipDynamics& dynamics, const nlohmann::json& r
   const double u_x = number_at(row, "u_x");
   const double u_z = number_at(row, "u_z");
   const Vec3 qdd = dynamics.accelerations_from_inputs(m, u_x, u_z);
-  return {{"theta", m.theta},
-          {"theta_dot", m.theta_dot},
-          {"phi_dot", m.phi_dot},
-          {"psi_dot", m.psi_dot},
-          {"u_x", u_x},
-          {"u_z", u_z},
-          {"qdd", array_of<3>(qdd)},
-          {"accel_B", array_of<3>(dynamics.accelerometer_B(m, qdd))}};
+  return {{"theta", m.theta},     {"theta_dot", m.theta_dot},
+          {"phi_dot", m.phi_dot}, {"psi_dot", m.psi_dot},
+          {"u_x", u_x},           {"u_z", u_z},
+          {"qdd", array_of(qdd)}, {"accel_B", array_of(dynamics.accelerometer_B(m, qdd))}};
 }
 
 using Model = std::function<nlohmann::json(const nlohmann::json&)>;

@@ -4,6 +4,26 @@
 
 namespace equipoise::app {
 
+nlohmann::json map_rows(const std::string& path,
+                        const std::function<nlohmann::json(const nlohmann::json&)>& row) {
+  const nlohmann::json in = read_json(path);
+  if (!in.is_object() || !in.contains("rows") || !in["rows"].is_array()) {
+    throw InputError(path + ": expected an object with an array \"rows\"");
+  }
+  nlohmann::json rows = nlohmann::json::array();
+  std::size_t index = 0;
+  for (const nlohmann::json& each : in["rows"]) {
+    try {
+      if (!each.is_object()) throw InputError("expected an object");
+      rows.push_back(row(each));
+    } catch (const InputError& error) {
+      throw InputError(path + ": rows[" + std::to_string(index) + "]: " + error.what());
+    }
+    ++index;
+  }
+  return {{"rows", rows}};
+}
+
 double number_at(const nlohmann::json& row, const std::string& key) {
   if (!row.contains(key)) throw InputError(key + ": missing");
   if (!row[key].is_number()) throw InputError(key + ": expected a number");
@@ -12,17 +32,22 @@ double number_at(const nlohmann::json& row, const std::string& key) {
   return value;
 }
 
-std::vector<double> numbers_at(const nlohmann::json& row, const std::string& key, std::size_t count) {
+Eigen::VectorXd numbers_at(const nlohmann::json& row, const std::string& key, Eigen::Index count) {
   if (!row.contains(key)) throw InputError(key + ": missing");
   const nlohmann::json& array = row[key];
   const std::string expected = key + ": expected an array of " + std::to_string(count) + " numbers";
-  if (!array.is_array() || array.size() != count) throw InputError(expected);
-  std::vector<double> values;
-  for (const nlohmann::json& element : array) {
+  if (!array.is_array() || static_cast<Eigen::Index>(array.size()) != count) throw InputError(expected);
+  Eigen::VectorXd values(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const nlohmann::json& element = array[static_cast<std::size_t>(i)];
     if (!element.is_number()) throw InputError(expected);
-    values.push_back(element.get<double>());
+    values(i) = element.get<double>();
   }
   return values;
+}
+
+nlohmann::json array_of(const Eigen::VectorXd& v) {
+  return std::vector<double>(v.data(), v.data() + v.size());
 }
 
 }  // namespace equipoise::app

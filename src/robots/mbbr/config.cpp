@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "config/common_config.hpp"
-#include "config/population.hpp"
 
 namespace equipoise {
 namespace {
@@ -156,20 +155,13 @@ MbbrWorldParams read_mbbr_world(Section s, BridgeType* bridge) {
   return w;
 }
 
-Loaded<MbbrConfig> read_mbbr(const Document& document) {
-  Section root(document, document.root(), "");
-  Loaded<MbbrConfig> loaded;
-  MbbrConfig& c = loaded.config;
-
+MbbrConfig read_mbbr(Section root) {
+  MbbrConfig c;
   Section robot = root.table("robot");
   config::expect_robot(robot, "mbbr");
   c.robot = read_robot(robot);
-  c.motor = config::read_motor(root.table("motor"));
-  c.calibration = config::read_calibration(root.table("calibration"), Mbbr::kWheels);
-  Section friction = root.table("friction");
   c.friction.coulomb_u = c.robot.mu_c / c.robot.k1;
-  c.friction.gain = friction.number("compensation", 0.0, 1.5);
-  friction.finish();
+  config::read_machine(root, Mbbr::kWheels, &c);
 
   Section estimator = root.table("estimator");
   c.estimators.ekf = read_ekf(estimator.table("ekf"));
@@ -191,42 +183,30 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   c.scheduled.yaw_feedforward = scheduled.boolean("yaw_feedforward");
   c.design = read_design(scheduled.table("design"));
   if (const auto problem = design_problem(c.robot, c.design, c.motor.k1()))
-    (problem->parameter.empty() ? scheduled.fail("design", problem->why)
-                                : robot.fail(problem->parameter, problem->why));
+    config::refuse(*problem, scheduled, robot);
   config::require_room(reference, c.reference.budget);
   c.scheduled.gains = design_mbbr(c.robot, c.design);
   scheduled.finish();
   controller.finish();
-  c.safety = config::read_safety(root.table("safety"));
-  c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
-
-  c.chain = config::read_chain(root.table("chain"));
+  config::read_surroundings(
+      root, c.robot.l_a,
+      [&c](Section world, std::size_t level) {
+        c.world[level] = read_mbbr_world(world, &c.world_bridge[level]);
+      },
+      &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
-
-  Section world = root.table("world");
-  for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
-    c.world[i] =
-        read_mbbr_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
-  }
-  world.finish();
-  if (root.has("population")) root.table("population");
-  config::check_population(document.root());
-  root.finish();
-  loaded.keys = document.keys();
-  loaded.sha256 = document.sha256();
-  loaded.toml = document.canonical();
-  return loaded;
+  return c;
 }
 
 }  // namespace
 
 Loaded<MbbrConfig> load_mbbr(const std::string& path, const Overrides& overrides) {
-  return read_mbbr(Document(path, overrides));
+  return config::loaded(Document(path, overrides), read_mbbr);
 }
 
 Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin,
                               const std::vector<std::string>& set) {
-  return read_mbbr(Document::parse(text, origin, set));
+  return config::loaded(Document::parse(text, origin, set), read_mbbr);
 }
 
 MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {

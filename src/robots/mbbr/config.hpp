@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "equipoise/config.hpp"
-#include "equipoise/control/chain.hpp"
 #include "equipoise/overrides.hpp"
 #include "equipoise/pipeline.hpp"
+#include "robots/common/config.hpp"
 #include "robots/mbbr/estimators.hpp"
 #include "robots/mbbr/reference.hpp"
 #include "robots/mbbr/scheduled_feedback.hpp"
@@ -24,21 +23,14 @@ using MbbrScheduledPipeline = Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage,
 extern template class Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrThesisFeedback>;
 extern template class Pipeline<Mbbr, MbbrEstimators, MbbrReferenceStage, MbbrScheduledFeedback>;
 
-struct MbbrConfig {
+struct MbbrConfig : CommonConfig {
   MbbrParameters robot;
-  MotorParameters motor;
-  Calibration calibration;
-  FrictionCompensation friction;
   MbbrEstimatorParams estimators;
   MbbrReferenceParams reference;
   MbbrThesisFeedbackParams thesis;
   MbbrDesignParams design;
   MbbrScheduledFeedbackParams scheduled;
-  SafetyParams safety;
-  AttitudeFilterParams attitude;
-  Chain chain;
-  std::array<MbbrWorldParams, kFidelities> world;      // by Fidelity
-  std::array<BridgeType, kFidelities> world_bridge{};  // what the simulated robot is built with
+  std::array<MbbrWorldParams, kFidelities> world;  // by Fidelity
 
   MbbrThesisPipeline::Params thesis_pipeline() const;
   MbbrScheduledPipeline::Params scheduled_pipeline() const;

@@ -5,18 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "robots/choice.hpp"
+#include "robots/common/firmware.hpp"
 #include "robots/mbbr/config.hpp"
 #include "robots/mbbr/engine_world.hpp"
 #include "robots/mbbr/world.hpp"
 
 namespace equipoise {
 
-struct MbbrFirmware {
-  using Robot = Mbbr;
-  using Config = MbbrConfig;
-  using Loaded = equipoise::Loaded<MbbrConfig>;
-  using World = MbbrWorld;
+struct MbbrFirmware : FirmwareBase<Mbbr, MbbrConfig, MbbrWorld> {
   using EngineWorld = MbbrEngineWorld;
   static constexpr const char* kName = "mbbr";
   static constexpr const char* kDefaultEstimator = "ekf";
@@ -39,7 +35,6 @@ struct MbbrFirmware {
     return {kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end()};
   }
   static std::vector<std::string> controllers() { return {"thesis", "scheduled"}; }
-  static double rolling_radius_m(const Config& c) { return c.robot.r; }
 
   /// The configuration with the choices applied, as it runs.
   static Config apply(const Config& configured, const Choice& choice) {
@@ -56,13 +51,6 @@ struct MbbrFirmware {
     }
     MbbrScheduledPipeline pipeline(config.scheduled_pipeline());
     return f(pipeline);
-  }
-
-  /// `config` as it runs; `level` of fidelity.
-  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
-    MbbrWorldParams params = config.world[level];
-    params.common.seed = seed;
-    return World(config.robot, config.motor, config.calibration, params);
   }
 };
 

@@ -1,7 +1,6 @@
 #include "robots/mip/config.hpp"
 
 #include "config/common_config.hpp"
-#include "config/population.hpp"
 
 namespace equipoise {
 namespace {
@@ -140,20 +139,13 @@ MipWorldParams read_mip_world(Section s, BridgeType* bridge) {
   return w;
 }
 
-Loaded<MipConfig> read_mip(const Document& document) {
-  Section root(document, document.root(), "");
-  Loaded<MipConfig> loaded;
-  MipConfig& c = loaded.config;
-
+MipConfig read_mip(Section root) {
+  MipConfig c;
   Section robot = root.table("robot");
   config::expect_robot(robot, "mip");
   c.robot = read_robot(robot);
-  c.motor = config::read_motor(root.table("motor"));
-  c.calibration = config::read_calibration(root.table("calibration"), Mip::kWheels);
-  Section friction = root.table("friction");
   c.friction.coulomb_u = c.robot.mu_c / c.robot.k1;
-  c.friction.gain = friction.number("compensation", 0.0, 1.5);
-  friction.finish();
+  config::read_machine(root, Mip::kWheels, &c);
   c.estimators = read_estimators(root.table("estimator"), c.robot);
   const Section reference = root.table("reference");
   c.reference = read_reference(reference, c.robot, c.friction.gain);
@@ -170,40 +162,29 @@ Loaded<MipConfig> read_mip(const Document& document) {
   lqr.finish();
   c.design.yaw = read_yaw_design(controller.table("yaw"));
   if (const auto problem = design_problem(c.robot, c.design, c.motor.k1()))
-    (problem->parameter.empty() ? lqr.fail("design", problem->why)
-                                : robot.fail(problem->parameter, problem->why));
+    config::refuse(*problem, lqr, robot);
   config::require_room(reference, c.reference.budget);
   c.slc.gains = c.lqr.gains = design_mip(c.robot, c.design);
   controller.finish();
-  c.safety = config::read_safety(root.table("safety"));
-  c.attitude = config::read_attitude(root.table("attitude"), c.robot.l_a);
-
-  c.chain = config::read_chain(root.table("chain"));
+  config::read_surroundings(
+      root, c.robot.l_a,
+      [&c](Section world, std::size_t level) {
+        c.world[level] = read_mip_world(world, &c.world_bridge[level]);
+      },
+      &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
-
-  Section world = root.table("world");
-  for (std::size_t i = 0; i < kFidelityNames.size(); ++i) {
-    c.world[i] = read_mip_world(world.table(config::world_key(world, kFidelityNames[i])), &c.world_bridge[i]);
-  }
-  world.finish();
-  if (root.has("population")) root.table("population");
-  config::check_population(document.root());
-  root.finish();
-  loaded.keys = document.keys();
-  loaded.sha256 = document.sha256();
-  loaded.toml = document.canonical();
-  return loaded;
+  return c;
 }
 
 }  // namespace
 
 Loaded<MipConfig> load_mip(const std::string& path, const Overrides& overrides) {
-  return read_mip(Document(path, overrides));
+  return config::loaded(Document(path, overrides), read_mip);
 }
 
 Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin,
                             const std::vector<std::string>& set) {
-  return read_mip(Document::parse(text, origin, set));
+  return config::loaded(Document::parse(text, origin, set), read_mip);
 }
 
 MipSlcPipeline::Params MipConfig::slc_pipeline() const {

@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "equipoise/config.hpp"
-#include "equipoise/control/chain.hpp"
 #include "equipoise/overrides.hpp"
 #include "equipoise/pipeline.hpp"
+#include "robots/common/config.hpp"
 #include "robots/mip/estimators.hpp"
 #include "robots/mip/lqr_feedback.hpp"
 #include "robots/mip/reference.hpp"
@@ -24,21 +23,14 @@ using MipLqrPipeline = Pipeline<Mip, MipEstimators, MipReferenceStage, MipLqrFee
 extern template class Pipeline<Mip, MipEstimators, MipReferenceStage, MipSlcFeedback>;
 extern template class Pipeline<Mip, MipEstimators, MipReferenceStage, MipLqrFeedback>;
 
-struct MipConfig {
+struct MipConfig : CommonConfig {
   MipParameters robot;
-  MotorParameters motor;
-  Calibration calibration;
-  FrictionCompensation friction;
   MipEstimatorParams estimators;
   MipReferenceParams reference;
   MipDesignParams design;
   MipSlcParams slc;
   MipLqrParams lqr;
-  SafetyParams safety;
-  AttitudeFilterParams attitude;
-  Chain chain;
-  std::array<MipWorldParams, kFidelities> world;       // by Fidelity
-  std::array<BridgeType, kFidelities> world_bridge{};  // what the simulated robot is built with
+  std::array<MipWorldParams, kFidelities> world;  // by Fidelity
 
   MipSlcPipeline::Params slc_pipeline() const;
   MipLqrPipeline::Params lqr_pipeline() const;

@@ -5,18 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "robots/choice.hpp"
+#include "robots/common/firmware.hpp"
 #include "robots/mip/config.hpp"
 #include "robots/mip/engine_world.hpp"
 #include "robots/mip/world.hpp"
 
 namespace equipoise {
 
-struct MipFirmware {
-  using Robot = Mip;
-  using Config = MipConfig;
-  using Loaded = equipoise::Loaded<MipConfig>;
-  using World = MipWorld;
+struct MipFirmware : FirmwareBase<Mip, MipConfig, MipWorld> {
   using EngineWorld = MipEngineWorld;
   static constexpr const char* kName = "mip";
   static constexpr const char* kDefaultEstimator = "ekf";
@@ -39,7 +35,6 @@ struct MipFirmware {
     return {kMipEstimatorNames.begin(), kMipEstimatorNames.end()};
   }
   static std::vector<std::string> controllers() { return {"slc", "lqr"}; }
-  static double rolling_radius_m(const Config& c) { return c.robot.r; }
 
   /// The configuration with the choices applied, as it runs.
   static Config apply(const Config& configured, const Choice& choice) {
@@ -56,13 +51,6 @@ struct MipFirmware {
     }
     MipLqrPipeline pipeline(config.lqr_pipeline());
     return f(pipeline);
-  }
-
-  /// `config` as it runs; `level` of fidelity.
-  static World world(const Config& config, std::size_t level, std::uint64_t seed) {
-    MipWorldParams params = config.world[level];
-    params.common.seed = seed;
-    return World(config.robot, config.motor, config.calibration, params);
   }
 };
 

@@ -45,6 +45,7 @@ struct Robot {
   using Kinematics = bench::Kinematics;
   using Estimate = bench::Estimate;
   using Sample = Measurement<kWheels>;
+  static double slip_rad_s(const Sample&, const Kinematics&, const Estimate&) noexcept { return 0.0; }
 };
 
 /// A robot whose encoders can be held against its gyro.

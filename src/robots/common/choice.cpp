@@ -1,4 +1,4 @@
-#include "robots/choice.hpp"
+#include "robots/common/choice.hpp"
 
 #include <algorithm>
 #include <limits>

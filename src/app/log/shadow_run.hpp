@@ -1,5 +1,5 @@
-// The body of shadow_log(), for one robot. In: log -> out: Shadow. Included where a list of robots is at
-// hand.
+// The body of shadow_log(), for one pipeline. In: its parameters, ticks of a log -> out: Shadow. Included by
+// shadow.cpp only.
 #pragma once
 
 #include <cmath>
@@ -33,32 +33,15 @@ inline std::vector<ShadowTick> shadow_ticks(RunLog& log) {
   return out;
 }
 
-/// Where one number decided, that number and its limit.
-template <class Health, class Estimate>
-void statistic(std::uint32_t reasons, const Health& h, const Estimate& x, const SafetyParams& p,
-               ShadowAlarm* alarm) {
-  alarm->ratio = alarm->bound = std::nan("");
-  const auto is = [&](double value, double limit) {
-    alarm->ratio = value;
-    alarm->bound = limit;
-  };
-  if ((reasons & kTilt) != 0) is(x.theta_rad.template head<2>().norm(), p.max_tilt_rad);
-  if ((reasons & kEstimatorUnhealthy) != 0) is(x.normalized_innovation, p.max_innovation);
-  if ((reasons & kEstimatorUnhealthy) != 0 && h.tilt_sigma_rad > p.max_tilt_sigma_rad)
-    is(h.tilt_sigma_rad, p.max_tilt_sigma_rad);
-  if ((reasons & kMotorFault) != 0) is(h.disturbance, p.max_disturbance);
-  if ((reasons & kImuUntrusted) != 0 && h.bias_drift_rad_s > p.max_bias_drift_rad_s)
-    is(h.bias_drift_rad_s, p.max_bias_drift_rad_s);
-}
-
 template <class P>
 class ShadowRun {
  public:
   using Robot = typename P::RobotType;
-  using Model = ShadowModel<Robot>;
+  using Model = decltype(shadow_model(std::declval<typename P::Params>().estimators));
   using Motion = typename Model::Motion;
   using Wheels = typename P::Wheels;
   using Input = typename P::Input;
+  using Health = EstimatorHealth<Robot::kWheels>;
 
   ShadowRun(const typename P::Params& params, double radius_m, double imu_height_m,
             std::vector<ShadowTick> ticks)
@@ -152,8 +135,7 @@ class ShadowRun {
     reasons_ = degraded_ = 0;
   }
 
-  template <class Result>
-  void judge(std::size_t k, const Result& t) {
+  void judge(std::size_t k, const typename P::Result& t) {
     judged_[k] = true;
     out_.judged_s += kTickS;
     estimates_[k] = {Model::start(t.x_hat, pipeline_->estimators().ekf()),
@@ -171,8 +153,7 @@ class ShadowRun {
   }
 
   /// What is new among reasons and degraded modes.
-  template <class Result, class Health>
-  void watch(std::size_t k, const Result& t, const Health& health) {
+  void watch(std::size_t k, const typename P::Result& t, const Health& health) {
     const bool fault = t.arm_state == ArmState::kFault;
     const std::uint32_t reasons = fault ? t.reasons & ~kNotOurs : 0;
     const std::uint32_t gaps = ticks_[k].raw.valid == 0 ? kWithoutImu | kWithoutEncoders : 0U;
@@ -187,8 +168,25 @@ class ShadowRun {
     reasons_ = reasons;
     degraded_ = degraded;
     if (alarm.hypothesis.empty()) return;
-    statistic(reasons, health, view(t.x_hat, params_.robot), params_.safety, &alarm);
+    statistic(reasons, health, view(t.x_hat, params_.robot), &alarm);
     out_.alarms.push_back(alarm);
+  }
+
+  /// Where one number decided, that number and its limit.
+  void statistic(std::uint32_t reasons, const Health& h, const StateView& x, ShadowAlarm* alarm) const {
+    const SafetyParams& p = params_.safety;
+    alarm->ratio = alarm->bound = std::nan("");
+    const auto is = [&](double value, double limit) {
+      alarm->ratio = value;
+      alarm->bound = limit;
+    };
+    if ((reasons & kTilt) != 0) is(x.theta_rad.head<2>().norm(), p.max_tilt_rad);
+    if ((reasons & kEstimatorUnhealthy) != 0) is(x.normalized_innovation, p.max_innovation);
+    if ((reasons & kEstimatorUnhealthy) != 0 && h.tilt_sigma_rad > p.max_tilt_sigma_rad)
+      is(h.tilt_sigma_rad, p.max_tilt_sigma_rad);
+    if ((reasons & kMotorFault) != 0) is(h.disturbance, p.max_disturbance);
+    if ((reasons & kImuUntrusted) != 0 && h.bias_drift_rad_s > p.max_bias_drift_rad_s)
+      is(h.bias_drift_rad_s, p.max_bias_drift_rad_s);
   }
 
   void predict() {
@@ -261,28 +259,5 @@ class ShadowRun {
   std::uint32_t reasons_ = 0, degraded_ = 0;
   Shadow out_;
 };
-
-template <class Firmware>
-Shadow shadow_as(RunLog& log, const std::string& origin, const std::string& path,
-                 const std::vector<std::string>& set) {
-  const runtime::RunInfo& info = log.run();
-  const auto loaded = path.empty() ? Firmware::parse(info.config_toml, origin + " (its configuration)", set)
-                                   : Firmware::load(path, set);
-  Choice choice{"", "", info.backend == "import" ? "" : info.fidelity, false, "", ""};
-  complete(type_as<Firmware>(), &choice);
-  const auto config = Firmware::apply(loaded.config, choice);
-  const auto& world = config.world[fidelity_level("full")].common;
-  Shadow out = Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
-    using P = std::decay_t<decltype(pipeline)>;
-    return ShadowRun<P>(pipeline.params(), Firmware::rolling_radius_m(config), config.robot.l_a.z(),
-                        shadow_ticks(log))
-        .run();
-  });
-  for (const char* axis : {"x", "y", "z"}) {
-    out.configured[std::string("gyro_") + axis + "_rad_s"] = world.gyro_sigma_rad_s;
-    out.configured[std::string("accel_") + axis + "_m_s2"] = world.accel_sigma_m_s2;
-  }
-  return out;
-}
 
 }  // namespace equipoise::app
