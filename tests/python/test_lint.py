@@ -238,6 +238,14 @@ def test_house_wants_short_files(tmp_path):
     assert [f.path for f in house.short_files(tree)] == ["src/long.cpp"]
 
 
+def test_house_wants_a_small_tree_and_each_picture_once(tmp_path, monkeypatch):
+    tree = planted(tmp_path, a_png="x" * 60, a_svg="x", b_svg="x" * 39)
+    monkeypatch.setattr(house, "LARGEST_TREE", 100)
+    assert [f.path for f in house.small_tree(tree)] == ["a.svg"]
+    monkeypatch.setattr(house, "LARGEST_TREE", 99)
+    assert [f.path for f in house.small_tree(tree)] == ["a.svg", "a.png"]
+
+
 class TestClangTidy:
     @pytest.fixture
     def project(self, tmp_path, root):

@@ -17,7 +17,7 @@ ESTIMATE = "#0072B2"
 OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F", "#8B6B3E")
 DASHES = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (6, 2, 1, 2, 1, 2)), (0, (8, 2)))
 DRIVE_PHASE = "#0072B2"
-COLOURS, DPI = 32, 90  # of a tracked picture: the width of a page
+COLOURS, DPI = 32, 80  # of a tracked picture: the width of a page
 
 RC = {
     "font.family": "DejaVu Sans",

@@ -110,7 +110,10 @@ def write(name: str, data: Data, out_dir: Path) -> None:
     columns["duration_s"] = pa.array([row["duration_s"] for row in rows], pa.float32())
     columns["value"] = pa.array([row["value"] for row in rows], pa.float64())
     options = {"compression": "zstd", "compression_level": 19}
-    pq.write_table(pa.table(columns), numbers, **options)
+    named = [*TEXTS, "seed", "duration_s"]
+    pq.write_table(
+        pa.table(columns), numbers, use_byte_stream_split=["value"], use_dictionary=named, **options
+    )
     traces.unlink(missing_ok=True)
     if data.traces:
         keys = sorted(data.traces)

@@ -1,4 +1,4 @@
-"""House rules a machine can check: the project stands alone, headers explain themselves, files stay short."""
+"""House rules a machine can check: headers explain themselves, files stay short, the tree small."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ FORBIDDEN = (
 )
 LONGEST_OPENING_COMMENT = 8
 LONGEST_FILE = 400
+LARGEST_TREE = 8_000_000  # bytes: who clones it fetches its history, too
 _BINARY = (".png", ".gif", ".svg", ".lcm", ".log", ".bin", ".gz", ".ico", ".csv", ".parquet")
 
 
@@ -71,5 +72,21 @@ def short_files(tree: Tree) -> list[Finding]:
     return findings
 
 
+def small_tree(tree: Tree) -> list[Finding]:
+    """Generated pages and pictures grow without anybody noticing; a picture is kept once."""
+    findings = [
+        Finding(name, 0, "is kept as a .png, too: one format for a picture")
+        for name in tree.files
+        if name.endswith(".svg") and name.removesuffix("svg") + "png" in tree.files
+    ]
+    sizes = {name: (tree.root / name).lstat().st_size for name in tree.files}
+    total = sum(sizes.values())
+    if total > LARGEST_TREE:
+        largest = max(sizes, key=sizes.__getitem__)
+        message = f"is the largest of {total / 1e6:.1f} MB; {LARGEST_TREE / 1e6:.0f} MB is the limit"
+        findings.append(Finding(largest, 0, message))
+    return findings
+
+
 def house(tree: Tree) -> list[Finding]:
-    return forbidden_words(tree) + headers_open_with_a_comment(tree) + short_files(tree)
+    return forbidden_words(tree) + headers_open_with_a_comment(tree) + short_files(tree) + small_tree(tree)
