@@ -18,7 +18,7 @@ FORBIDDEN = (
 )
 LONGEST_OPENING_COMMENT = 8
 LONGEST_FILE = 400
-LARGEST_TREE = 8_000_000  # bytes: who clones it fetches its history, too
+LARGEST_TREE = 8 * 2**20  # bytes: who clones it fetches its history, too
 _BINARY = (".png", ".gif", ".svg", ".lcm", ".log", ".bin", ".gz", ".ico", ".csv", ".parquet")
 
 
@@ -83,7 +83,7 @@ def small_tree(tree: Tree) -> list[Finding]:
     total = sum(sizes.values())
     if total > LARGEST_TREE:
         largest = max(sizes, key=sizes.__getitem__)
-        message = f"is the largest of {total / 1e6:.1f} MB; {LARGEST_TREE / 1e6:.0f} MB is the limit"
+        message = f"is the largest of {total / 2**20:.2f} MB; {LARGEST_TREE / 2**20:g} MB is the limit"
         findings.append(Finding(largest, 0, message))
     return findings
 
