@@ -12,6 +12,19 @@
 namespace equipoise {
 namespace {
 
+/// Io of the loop for one tick.
+struct OneSample {
+  RawSample raw;
+  std::int64_t now_ns;
+
+  int wait_tick(std::int64_t* now) noexcept {
+    *now = now_ns;
+    return 0;
+  }
+  RawSample read() noexcept { return raw; }
+  int write(const MotorCommand& /*command*/) noexcept { return 0; }
+};
+
 /// Of the runtime's pipelines; the one it is derived from is in control.
 template <class Pipeline>
 class WithShadow : public Pipeline {
@@ -22,7 +35,12 @@ class WithShadow : public Pipeline {
 
   typename Pipeline::Result tick(const RawSample& raw, const Command& asked, const LoopState& loop) noexcept {
     single_.applied(this->applied(), this->held());
-    (void)single_.tick(raw, asked, loop);
+    OneSample io{raw, loop.now_ns};
+    runtime::LoopEnd end;
+    runtime::NoSupervisor nobody;
+    const auto commands = [&asked](std::int64_t, std::int64_t) { return asked; };
+    (void)runtime::run_tick(
+        io, single_, commands, [](auto&&...) {}, nobody, &end);
     return Pipeline::tick(raw, asked, loop);
   }
   const auto& in_double() const noexcept { return this->estimators().ekf(); }
