@@ -24,7 +24,7 @@ struct MbbrAccess {
     return w;
   }
   static nlohmann::json dimensions(const MbbrParameters& nominal, const MbbrWorldParams& world) {
-    const MbbrParameters p = as_built(nominal, world.common.actual);
+    const MbbrParameters p = without_loose_wheels(as_built(nominal, world.common.actual), world.drive);
     return {{"body_mass_kg", p.m_t},
             {"com_height_m", p.l},
             {"body_inertia_kg_m2", {p.I_t1, p.I_t2, p.I_t3}},

@@ -37,16 +37,15 @@ double grip_limit_N_m(double wheel_grip, const MbbrParameters& robot) noexcept {
   return wheel_grip * load * robot.r_w;
 }
 
-Grip limit_by_grip(double torque_N_m, double limit_N_m, double motor_damping_N_m_s) noexcept {
-  const double passed = std::clamp(torque_N_m, -limit_N_m, limit_N_m);
-  return {passed, (torque_N_m - passed) / motor_damping_N_m_s};
-}
-
 MbbrDrive::MbbrDrive(const MbbrParameters& robot, const MbbrDriveParams& p)
     : p_(p),
       kinematics_(robot),
       ratio_(robot.r / robot.r_w),
       wheel_radius_m_(robot.r_w),
+      rotor_inertia_kg_m2_(robot.I_w / (ratio_ * ratio_)),
+      // [T] section 5.3 identified the friction of all three gears about x, and about y.
+      gear_share_(p.gearbox_friction_share /
+                  (ratio_ * 0.5 * kinematics_.T_ob().topRows<2>().cwiseAbs().sum())),
       grip_N_m_(Vec3::Constant(grip_limit_N_m(p.wheel_grip, robot))),
       hung_(turned_by(Vec3(p.com_offset_rad.x(), p.com_offset_rad.y(), 0.0))),
       contacts_(hung_ * wheel_contacts(robot)),
@@ -92,27 +91,41 @@ void MbbrDrive::begin_step(const Motors& motors, const Vec3& relative_rate_B, co
 }
 
 Vec3 MbbrDrive::torque_B(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept {
-  Vec3 passed = wheel_torque;
-  Vec3 beyond = friction_B;
-  if (slips()) {
-    passed = contact_torques(wheel_torque, friction_B).cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
-    beyond *= 1.0 - p_.gearbox_friction_share;
-  }
-  if (!tilts()) return kinematics_.axes_from_wheels(passed) + beyond;
-  return ratio_ * (tilted_ * passed) + beyond;
+  if (!tilts()) return kinematics_.axes_from_wheels(wheel_torque) + friction_B;
+  if (!slips()) return ratio_ * (tilted_ * wheel_torque) + friction_B;
+  return ratio_ * (tilted_ * contact_torques(wheel_torque, friction_B)) + share_beyond() * friction_B;
 }
 
-void MbbrDrive::slip_over(const Motors& motors, const Vec3& wheel_torque, const Vec3& friction_B,
-                          double step_s) noexcept {
-  const Vec3 torque = contact_torques(wheel_torque, friction_B);
+bool MbbrDrive::carries(const Vec3& wheel_torque, const Vec3& friction_B,
+                        const Vec3& relative_acceleration_B) const noexcept {
+  if (!slips()) return true;
+  const Vec3 turns = rotor_inertia_kg_m2_ * wheel_rates(relative_acceleration_B);
+  const Vec3 contacts = contact_torques(wheel_torque, friction_B) - turns;
+  return (contacts.array().abs() <= grip_N_m_.array()).all();
+}
+
+/// Implicit in the motors' back-EMF, which stops a free rotor within about a step.
+MbbrRotors MbbrDrive::rotors(const Motors& motors, const Vec3& rates, double coulomb_N_m,
+                             const Stiction& stiction, double viscous, double step_s) const noexcept {
+  const Vec3 motor = p_.wheel_torque_scale.cwiseProduct(engaged_);
+  const Vec3 damping = motors.enabled() ? Vec3(motors.damping_N_m_s() * motor) : Vec3(Vec3::Zero());
+  const Vec3 torque = motor.cwiseProduct(motors.torque(rates)) + ripple_N_m_;
+  const double inertia = rotor_inertia_kg_m2_ / step_s;
+  const double rubs = p_.gearbox_friction_share * viscous / (ratio_ * ratio_);
+  MbbrRotors r;
+  r.loose = slips();
+  r.axes_B = ratio_ * tilted_;
+  r.compliance = (damping.array() + inertia + rubs).inverse();
+  r.free_rad_s = r.compliance.cwiseProduct(inertia * rates + torque + damping.cwiseProduct(rates));
   for (int i = 0; i < Mbbr::kWheels; ++i) {
-    slip_rad_(i) += limit_by_grip(torque(i), grip_N_m_(i), motors.damping_N_m_s()).slip_rad_s * step_s;
+    r.gear_N_m(i) = gear_share_ * coulomb_N_m * stiction.factor(rates(i) / ratio_);
   }
+  r.grip_N_m = grip_N_m_;
+  return r;
 }
 
-void MbbrDrive::carry(const Vec3& body_force_B, const Vec3& wheel_torque, const Vec3& friction_B) noexcept {
-  const Vec3 passed = contact_torques(wheel_torque, friction_B).cwiseMin(grip_N_m_).cwiseMax(-grip_N_m_);
-  const Vec3 normal_N = loads_from_force_ * (body_force_B + pushes_ * passed / wheel_radius_m_);
+void MbbrDrive::carry(const Vec3& body_force_B, const Vec3& contact_torques) noexcept {
+  const Vec3 normal_N = loads_from_force_ * (body_force_B + pushes_ * contact_torques / wheel_radius_m_);
   grip_N_m_ = p_.wheel_grip * wheel_radius_m_ * normal_N.cwiseMax(0.0);
 }
 

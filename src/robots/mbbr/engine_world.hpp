@@ -21,6 +21,8 @@ class MbbrEngineWorld {
 
  private:
   void step();
+  Vec3 body_force_B() const noexcept;
+  Vec3 torque_B(const Vec3& relative_rate_B, const Vec3& others, double h) noexcept;
   Vec<kMaxMotors> encoders() const noexcept;
 
   MbbrParameters robot_;
@@ -31,6 +33,8 @@ class MbbrEngineWorld {
   MbbrDrive drive_;
   EngineBody body_;
   Vec3 seen_B_rad_ = Vec3::Zero();       // ball against body, as the wheels' nominal axes report it
+  Vec3 omega_dot_B_ = Vec3::Zero();      // over the last step
+  Vec3 rotor_rad_s_ = Vec3::Zero();      // where wheels may slip
   Vec3 others_B_rad_s2_ = Vec3::Zero();  // acceleration of the joint by all but our torque, a step ago
 };
 

@@ -24,9 +24,29 @@ Mat<6, 8> constraint_rows(const MbbrMotion& m, double r) noexcept {
   return J;
 }
 
+/// A wheel on the ball with its rotor and the friction between motor and contact. Rates at the wheel, at the
+/// end of the step: the ball's is `ball` + `ball_gain` x contact torque.
+struct RotorContact {
+  double ball, ball_gain;
+  double rotor, compliance, gear_N_m;
+
+  double rotor_rate(double torque) const noexcept {
+    const double driven = rotor - compliance * torque;
+    return std::copysign(std::max(0.0, std::abs(driven) - compliance * gear_N_m), driven);
+  }
+  /// That ends the step without slip.
+  double sticking_torque() const noexcept {
+    const double locked = -ball / ball_gain;
+    const double driven = rotor - compliance * locked;
+    if (std::abs(driven) <= compliance * gear_N_m) return locked;
+    return (rotor - std::copysign(compliance * gear_N_m, driven) - ball) / (ball_gain + compliance);
+  }
+};
+
 }  // namespace
 
 bool MbbrSlipping::carries(const MbbrFloorForce& needed) const noexcept {
+  if (!limited()) return true;
   const double most = floor_.grip * std::max(needed.normal_N, 0.0);
   return needed.force_star_N.norm() <= most && std::abs(needed.torsion_N_m) <= most * floor_.torsion_radius_m;
 }
@@ -79,28 +99,51 @@ MbbrSlipAccelerations MbbrSlipping::accelerations(const MbbrMotion& m, const Mas
 }
 
 MbbrFriction MbbrSlipping::friction(const MbbrMotion& m, const Mass& mass, const Vec<6>& free, double step_s,
-                                    const Vec3& limit_B, double normal_N) const noexcept {
-  constexpr int kSweeps = 40;
+                                    const Vec3& limit_B, const MbbrRotors& rotors,
+                                    double normal_N) const noexcept {
   const Mat<6, 8> J = constraint_rows(m, p_.r);
-  const Mat<8, 6> effect = mass.solve(J.transpose().eval());
-  const Mat<6, 6> A = step_s * J * effect;
-  const double most = floor_.grip * std::max(normal_N, 0.0);
-  Vec<6> limit;
-  limit << limit_B, most, most, most * floor_.torsion_radius_m;
-  Vec<6> f = Vec<6>::Zero();
-  bool holds = true;
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {  // projected Gauss-Seidel; the floor's force lies in a disk
-    for (int i = 0; i < 6; ++i) {
-      f(i) = std::clamp(f(i) - (free(i) + A.row(i).dot(f)) / A(i, i), -limit(i), limit(i));
-    }
-    const double slides = f.segment<2>(3).norm();
-    holds = slides <= most && std::abs(f(5)) < limit(5);
-    if (slides > most) f.segment<2>(3) *= most / slides;
-  }
+  const Mat<6, 6> A = step_s * J * mass.solve(J.transpose().eval());
+  const double most = limited() ? floor_.grip * std::max(normal_N, 0.0) : kNeverGivesWay;
+  return contact_friction(A, free, limit_B, rotors,
+                          {most, limited() ? most * floor_.torsion_radius_m : kNeverGivesWay, normal_N});
+}
+
+/// Projected Gauss-Seidel. Rows: axes, wheels, floor. A rotor and its gear are solved with its contact.
+MbbrFriction contact_friction(const Mat<6, 6>& response, const Vec<6>& free, const Vec3& limit_B,
+                              const MbbrRotors& rotors, const MbbrFloorLimits& floor) noexcept {
+  const int sweeps = rotors.loose ? 200 : 40;  // few where no rotor is coupled
+  constexpr double kSame_N = 1e-9;
+  Mat<9, 6> rows = Mat<9, 6>::Zero();
+  rows.topLeftCorner<3, 3>().setIdentity();
+  rows.block<3, 3>(3, 0) = rotors.axes_B.transpose();
+  rows.bottomRightCorner<3, 3>().setIdentity();
+  const Mat<9, 9> A = rows * response * rows.transpose();
+  const Vec<9> b = rows * free;
+  Vec<9> f = Vec<9>::Zero();
+  const auto others = [&](int i) { return b(i) + A.row(i).dot(f) - A(i, i) * f(i); };
   MbbrFriction result;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    const Vec<9> before = f;
+    for (int i = 0; i < 3; ++i) f(i) = std::clamp(-others(i) / A(i, i), -limit_B(i), limit_B(i));
+    result.holds = true;
+    for (int i = 0; i < 3 && rotors.loose; ++i) {
+      const RotorContact contact{others(3 + i), A(3 + i, 3 + i), rotors.free_rad_s(i), rotors.compliance(i),
+                                 rotors.gear_N_m(i)};
+      const double sticking = contact.sticking_torque();
+      f(3 + i) = std::clamp(sticking, -rotors.grip_N_m(i), rotors.grip_N_m(i));
+      result.rotor_rad_s(i) = contact.rotor_rate(f(3 + i));
+      result.holds = result.holds && f(3 + i) == sticking;
+    }
+    for (int i = 6; i < 8; ++i) f(i) = std::clamp(-others(i) / A(i, i), -floor.force_N, floor.force_N);
+    const double slides = f.segment<2>(6).norm();
+    if (slides > floor.force_N) f.segment<2>(6) *= floor.force_N / slides;
+    f(8) = std::clamp(-others(8) / A(8, 8), -floor.torsion_N_m, floor.torsion_N_m);
+    result.holds = result.holds && slides <= floor.force_N && std::abs(f(8)) < floor.torsion_N_m;
+    if ((f - before).cwiseAbs().maxCoeff() < kSame_N) break;
+  }
   result.axes_B = f.head<3>();
-  result.floor = {f.segment<2>(3), f(5), normal_N};
-  result.floor_holds = holds;
+  result.wheels = f.segment<3>(3);
+  result.floor = {f.segment<2>(6), f(8), floor.normal_N};
   return result;
 }
 

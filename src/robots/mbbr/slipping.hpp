@@ -1,7 +1,7 @@
-// The MBBR on a floor that carries only so much: its ball may slide and spin, so it has eight velocities
-// where rolling leaves five. In: motion, loads, friction limits -> out: what the floor must carry;
-// accelerations under what it does carry. Same conventions as dynamics.hpp. Simulation only; deterministic,
-// no allocation.
+// The MBBR where contacts carry only so much: its ball may slide and spin on the floor and its wheels slip on
+// the ball, so it has eight velocities where rolling leaves five, and three of the rotors. In: motion, loads,
+// friction limits -> out: what the floor must carry; what all contacts and friction do carry; accelerations
+// under that. Same conventions as dynamics.hpp. Simulation only; deterministic, no allocation.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -29,12 +29,39 @@ struct MbbrSlipAccelerations {
   Vec2 centre_star = Vec2::Zero();
 };
 
-/// Friction of one step: about the body axes, and the floor's.
-struct MbbrFriction {
-  Vec3 axes_B = Vec3::Zero();
-  MbbrFloorForce floor;
-  bool floor_holds = true;  // within what it carries: the ball rolls at the end of the step
+/// The rotors with gears and wheels, over one step, each at its wheel; `axes_B`: torque on the ball per
+/// torque of each contact.
+struct MbbrRotors {
+  bool loose = true;  // else they turn with the ball, and are of its mass
+  Mat3 axes_B = Mat3::Identity();
+  Vec3 free_rad_s = Vec3::Zero();  // rates at its end if nothing rubbed
+  Vec3 compliance = Vec3::Zero();  // what a torque over it adds to them, rad/s per N m
+  Vec3 gear_N_m = Vec3::Zero();    // friction before the contacts, at most
+  Vec3 grip_N_m = Vec3::Zero();    // what the contacts carry, at most
 };
+
+/// Torques and forces of one step.
+struct MbbrFriction {
+  Vec3 axes_B = Vec3::Zero();       // friction beyond the contacts
+  Vec3 wheels = Vec3::Zero();       // of the contacts, at the wheels
+  Vec3 rotor_rad_s = Vec3::Zero();  // at its end
+  MbbrFloorForce floor;
+  bool holds = true;  // all within what they carry: at the end of the step everything rolls
+};
+
+constexpr double kNeverGivesWay = 1e9;  // of a contact without limit; N, N m
+
+struct MbbrFloorLimits {
+  double force_N = 0.0;
+  double torsion_N_m = 0.0;
+  double normal_N = 0.0;
+};
+
+/// Friction about the axes (at most `limit_B`), of wheels and floor that bring relative rates, slip and spin
+/// to rest within a step, as far as they may. `free`: what they would be without; `response`: what the same
+/// torques and forces add to them.
+MbbrFriction contact_friction(const Mat<6, 6>& response, const Vec<6>& free, const Vec3& limit_B,
+                              const MbbrRotors& rotors, const MbbrFloorLimits& floor) noexcept;
 
 class MbbrSlipping {
  public:
@@ -55,10 +82,9 @@ class MbbrSlipping {
   MbbrSlipAccelerations accelerations(const MbbrMotion& m, const Mass& mass, const MbbrLoads& loads,
                                       const MbbrFloorForce& floor) const noexcept;
 
-  /// Friction about the axes (at most `limit_B`) and of the floor (under `normal_N`) that bring relative
-  /// rates, slip and spin to rest within the step, as far as they may; `free`: what they would be without.
+  /// The same of a step of this robot under `normal_N`.
   MbbrFriction friction(const MbbrMotion& m, const Mass& mass, const Vec<6>& free, double step_s,
-                        const Vec3& limit_B, double normal_N) const noexcept;
+                        const Vec3& limit_B, const MbbrRotors& rotors, double normal_N) const noexcept;
 
  private:
   MbbrParameters p_;

@@ -41,6 +41,11 @@ MbbrParameters as_built(MbbrParameters p, const ActualScales& actual) noexcept {
   return p;
 }
 
+MbbrParameters without_loose_wheels(MbbrParameters p, const MbbrDriveParams& drive) noexcept {
+  if (drive.wheel_grip != 0.0) p.I_w = 0.0;
+  return p;
+}
+
 MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
                      const Calibration& calibration, const MbbrWorldParams& world)
     : robot_(as_built(robot, world.common.actual)),
@@ -51,6 +56,7 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       motors_(motor, calibration, world.common),
       drive_(robot_, with_offset(world)),
       floor_(robot_, world.floor),
+      loose_(without_loose_wheels(robot_, world.drive), world.floor),
       ground_(world.common.floor, robot_.r, world.common.seed),
       start_noise_(world.common.seed, kStartNoise),
       process_noise_(world.common.seed, kProcessNoise),
@@ -59,6 +65,7 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       here_(s_),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)),
       uneven_(world.common.floor.uneven()),
+      limited_(floor_.limited() || drive_.slips()),
       plain_(world.common.plain() && world.drive.even() && !floor_.limited()) {}
 
 MbbrWorld::Here MbbrWorld::near(const State& s) const noexcept {
@@ -95,8 +102,7 @@ double MbbrWorld::viscous_N_m_s() const noexcept {
   return world_.common.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
 }
 
-void MbbrWorld::forces(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept {
-  now->drive(wheels(), viscous_N_m_s(), friction_B);
+void MbbrWorld::push_and_pull(Instant* now, const Vec2& push_W) const noexcept {
   if (!push_W.isZero(0.0)) {
     now->loads.push_B = now->motion.R().topRows<2>().transpose() * now->heading.back(push_W);
   }
@@ -104,7 +110,8 @@ void MbbrWorld::forces(Instant* now, const Vec2& push_W, const Vec3& friction_B)
 }
 
 void MbbrWorld::rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept {
-  forces(now, push_W, friction_B);
+  now->drive(wheels(), viscous_N_m_s(), friction_B);
+  push_and_pull(now, push_W);
   now->roll(dynamics_);
 }
 
@@ -139,15 +146,39 @@ Vec3 MbbrWorld::coulomb_torque_B(const Instant& free) const noexcept {
   return uncoupled_coulomb_torque<double, 3>(free.relative_after(h), mobility_, h, friction_limit_B(free));
 }
 
-/// The same where the floor may give way: all axes, the slip and the spin together.
-MbbrFriction MbbrWorld::slip_friction(const State& s, const Instant& free, double h) const noexcept {
-  const auto mass = floor_.mass(free.motion);
-  const MbbrSlipAccelerations a = floor_.accelerations(free.motion, mass, free.loads, {});
-  const State next = s + h * slip_derivative(s, free, a);
+void MbbrWorld::slip_forces(Instant* now, const Vec2& push_W, const MbbrFriction& f) const noexcept {
+  push_and_pull(now, push_W);
+  if (drive_.slips()) {
+    const Vec3 beyond_B = f.axes_B - drive_.share_beyond() * viscous_N_m_s() * now->relative_B;
+    now->loads.tau_B = drive_.on_ball_B(f.wheels) + beyond_B;
+  } else {
+    now->drive(wheels(), viscous_N_m_s(), f.axes_B);
+  }
+}
+
+/// What contacts, gears and axes carry in this step where they may give way.
+MbbrFriction MbbrWorld::slip_friction(const Vec2& push_W, double h) const noexcept {
+  Instant free(here_);
+  slip_forces(&free, push_W, {});
+  const auto mass = loose_.mass(free.motion);
+  const MbbrSlipAccelerations a = loose_.accelerations(free.motion, mass, free.loads, {});
+  const State next = s_ + h * slip_derivative(s_, free, a);
   Vec<6> rates;
   rates << near(next).relative_B, next.segment<3>(kSlip);
-  const double normal = needed(free, felt_as_rolling(a, robot_.r)).normal_N;
-  return floor_.friction(free.motion, mass, rates, h, friction_limit_B(free), normal);
+  const double coulomb =
+      world_.common.friction ? robot_.mu_c * world_.coulomb_scale * world_.common.friction_now(time_s_) : 0.0;
+  return loose_.friction(
+      free.motion, mass, rates, h, drive_.share_beyond() * friction_limit_B(free),
+      drive_.rotors(motors_, rotor_rad_s_, coulomb, world_.common.stiction, viscous_N_m_s(), h),
+      needed(free, felt_as_rolling(a, robot_.r)).normal_N);
+}
+
+/// While everything rolls: does it stay so?
+bool MbbrWorld::contacts_hold(const Instant& now, const Vec3& friction_B) const noexcept {
+  const Vec2& ball = now.a.phi_ddot_inertial;
+  const Vec3 relative = now.motion.R().topRows<2>().transpose() * ball - now.a.omega_dot_B;
+  return floor_.carries(needed(now, now.a)) &&
+         drive_.carries(now.wheel_torque, now.viscous_B + friction_B, relative);
 }
 
 /// What the floor must carry; one that lifts the robot carries more.
@@ -187,13 +218,22 @@ void MbbrWorld::disturb() {
   s_ = s;
 }
 
-void MbbrWorld::load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a,
-                            double h) noexcept {
+void MbbrWorld::load_wheels(const Instant& now, const MbbrAccelerations& a,
+                            const Vec3& contact_torques) noexcept {
   if (!drive_.slips()) return;
-  const Vec3 total_B = now.viscous_B + friction_B;
   const Vec3 force_B = -robot_.m_t * dynamics_.accelerometer_B(now.motion, a, Vec3(0.0, 0.0, robot_.l));
-  drive_.slip_over(motors_, now.wheel_torque, total_B, h);
-  drive_.carry(force_B - now.loads.push_B, now.wheel_torque, total_B);
+  drive_.carry(force_B - now.loads.push_B, contact_torques);
+}
+
+Vec3 MbbrWorld::wheel_slip_rad_s() const noexcept {
+  if (!slipping_ || !drive_.slips()) return Vec3::Zero();
+  return rotor_rad_s_ - drive_.wheel_rates(here_.relative_B);
+}
+
+MbbrSlipAccelerations MbbrWorld::slip_accelerations(const Here& here, const Vec2& push_W) const noexcept {
+  Instant now(here);
+  slip_forces(&now, push_W, friction_);
+  return loose_.accelerations(now.motion, loose_.mass(now.motion), now.loads, friction_.floor);
 }
 
 void MbbrWorld::step(double h) noexcept {
@@ -204,43 +244,48 @@ void MbbrWorld::step(double h) noexcept {
   }
   drive_.begin_step(motors_, here_.relative_B, kinematics_.wheels_from_ball(s_.segment<3>(kRelative)), h);
   const Vec2 push = push_now();
+  if (!slipping_ && roll(push, h)) return;
+  slip(push, h);
+}
+
+/// A step without slip; false, and nothing done, if the contacts do not carry it.
+bool MbbrWorld::roll(const Vec2& push, double h) noexcept {
   Instant free(here_);
   rolling(&free, push, Vec3::Zero());
-  if (!slipping_) {
-    friction_.axes_B = coulomb_torque_B(free);
-    const Instant now = free.with_friction(dynamics_, wheels(), friction_.axes_B);
-    slipping_ = floor_.limited() && !floor_.carries(needed(now, now.a));
-    if (!slipping_) {
-      if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
-      load_wheels(now, friction_.axes_B, now.a, h);
-      arrive(rk4_step(s_, now.derivative(wheels()), h, [&](const State& s) {
-        Instant then(near(s));
-        rolling(&then, push, friction_.axes_B);
-        return then.derivative(wheels());
-      }));
-      time_s_ += h;
-      return;
-    }
-  }
-  friction_ = slip_friction(s_, free, h);
-  const auto sliding = [&](const Here& here) {
-    Instant now(here);
-    forces(&now, push, friction_.axes_B);
-    return floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
-  };
-  const MbbrSlipAccelerations a = sliding(here_);
+  friction_.axes_B = coulomb_torque_B(free);
+  const Instant now = free.with_friction(dynamics_, wheels(), friction_.axes_B);
+  if (limited_ && !contacts_hold(now, friction_.axes_B)) return false;
+  if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
+  load_wheels(now, now.a, drive_.contact_torques(now.wheel_torque, now.viscous_B + friction_.axes_B));
+  arrive(rk4_step(s_, now.derivative(wheels()), h, [&](const State& s) {
+    Instant then(near(s));
+    rolling(&then, push, friction_.axes_B);
+    return then.derivative(wheels());
+  }));
+  time_s_ += h;
+  return true;
+}
+
+void MbbrWorld::slip(const Vec2& push, double h) noexcept {
+  if (!slipping_) rotor_rad_s_ = drive_.wheel_rates(here_.relative_B);
+  slipping_ = true;
+  friction_ = slip_friction(push, h);
+  const MbbrSlipAccelerations a = slip_accelerations(here_, push);
   const MbbrAccelerations felt_a = felt_as_rolling(a, robot_.r);
-  if (sensors_.aged()) sensors_.feel(felt(free.motion, felt_a));
-  load_wheels(free, friction_.axes_B, felt_a, h);
-  State next = rk4_step(s_, slip_derivative(s_, free, a), h, [&](const State& s) {
-    const Here now = near(s);
-    return slip_derivative(s, now, sliding(now));
+  Instant now(here_);
+  push_and_pull(&now, push);
+  if (sensors_.aged()) sensors_.feel(felt(now.motion, felt_a));
+  load_wheels(now, felt_a, friction_.wheels);
+  const Vec3 before = wheel_slip_rad_s();
+  State next = rk4_step(s_, slip_derivative(s_, here_, a), h, [&](const State& s) {
+    const Here then = near(s);
+    return slip_derivative(s, then, slip_accelerations(then, push));
   });
-  if (friction_.floor_holds) {
-    next.segment<3>(kSlip).setZero();
-    slipping_ = false;
-  }
+  rotor_rad_s_ = friction_.rotor_rad_s;
+  if (friction_.holds) next.segment<3>(kSlip).setZero();
   arrive(next);
+  drive_.slip_by(0.5 * h * (before + wheel_slip_rad_s()));
+  slipping_ = !friction_.holds;
   time_s_ += h;
 }
 
@@ -315,11 +360,7 @@ void MbbrWorld::end_rolling(const Rolling& robot) noexcept {
 Felt MbbrWorld::felt_now() const noexcept {
   if (rolled_) return felt(s_.segment<3>(kOmega), rolled_force_B_);
   if (slipping_) {
-    Instant now(here_);
-    forces(&now, push_now(), friction_.axes_B);
-    const MbbrSlipAccelerations a =
-        floor_.accelerations(now.motion, floor_.mass(now.motion), now.loads, friction_.floor);
-    return felt(now.motion, felt_as_rolling(a, robot_.r));
+    return felt(here_.motion, felt_as_rolling(slip_accelerations(here_, push_now()), robot_.r));
   }
   Instant now(here_);
   rolling(&now, push_now(), Vec3::Zero());

@@ -25,6 +25,9 @@ struct MbbrWorldParams {
 /// The robot as it is built, where the firmware has `nominal`.
 MbbrParameters as_built(MbbrParameters nominal, const ActualScales& actual) noexcept;
 
+/// The bodies of ball and robot: wheels that may slip turn by themselves.
+MbbrParameters without_loose_wheels(MbbrParameters built, const MbbrDriveParams& drive) noexcept;
+
 /// Largest friction torque about each body axis at these relative rates.
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept;
 
@@ -55,7 +58,8 @@ class MbbrWorld {
   double time_s() const noexcept { return time_s_; }
   bool held() const noexcept { return held_; }
   double battery_V() const noexcept { return motors_.battery_V(); }
-  bool slipping() const noexcept { return slipping_; }  // the ball on the floor
+  bool slipping() const noexcept { return slipping_; }  // the ball on the floor, or a wheel on the ball
+  Vec3 wheel_slip_rad_s() const noexcept;               // wheels ahead of the ball
 
  private:
   using State = MbbrStateOf<double>;
@@ -76,12 +80,15 @@ class MbbrWorld {
   double viscous_N_m_s() const noexcept;
   Here near(const State& s) const noexcept;  // within a step from here
   /// Of an instant whose motion is known: forces, and accelerations of a ball that rolls.
-  void forces(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
+  void push_and_pull(Instant* now, const Vec2& push_W) const noexcept;
   void rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept;
   State slip_derivative(const State& s, const Here& now, const MbbrSlipAccelerations& a) const noexcept;
   Vec3 friction_limit_B(const Instant& now) const noexcept;
   Vec3 coulomb_torque_B(const Instant& free) const noexcept;
-  MbbrFriction slip_friction(const State& s, const Instant& free, double h) const noexcept;
+  bool contacts_hold(const Instant& now, const Vec3& friction_B) const noexcept;
+  MbbrFriction slip_friction(const Vec2& push_W, double h) const noexcept;
+  void slip_forces(Instant* now, const Vec2& push_W, const MbbrFriction& friction) const noexcept;
+  MbbrSlipAccelerations slip_accelerations(const Here& here, const Vec2& push_W) const noexcept;
   Vec2 pull_star(const Instant& now) const noexcept;
   MbbrFloorForce needed(const Instant& now, const MbbrAccelerations& a) const noexcept;
   void advance_tick(const MotorCommand& command);
@@ -90,7 +97,9 @@ class MbbrWorld {
   Felt felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept;
   Felt felt_now() const noexcept;
   void step(double h) noexcept;
-  void load_wheels(const Instant& now, const Vec3& friction_B, const MbbrAccelerations& a, double h) noexcept;
+  bool roll(const Vec2& push_W, double h) noexcept;
+  void slip(const Vec2& push_W, double h) noexcept;
+  void load_wheels(const Instant& now, const MbbrAccelerations& a, const Vec3& contact_torques) noexcept;
   void disturb();
   void end_tick() noexcept;
   void arrive(const State& s) noexcept;
@@ -103,19 +112,22 @@ class MbbrWorld {
   MbbrDrive::Motors motors_;
   MbbrDrive drive_;
   MbbrSlipping floor_;
+  MbbrSlipping loose_;  // without wheels that may slip: bodies of their own
   Ground ground_;
   NoiseStream start_noise_, process_noise_, loop_noise_;
   State s_;
   Here here_;  // at s_
   SimulatedSensors sensors_;
   bool uneven_;
-  bool plain_;  // as MbbrRollingOf has it
+  bool limited_;  // a contact may give way
+  bool plain_;    // as MbbrRollingOf has it
   double time_s_ = 0.0;
   bool held_ = true;
   bool slipping_ = false;
   bool rolled_ = false;  // the last tick, and what is felt since is known
   Vec3 rolled_force_B_ = Vec3::Zero();
-  MbbrFriction friction_;  // of the last step
+  MbbrFriction friction_;            // of the last step
+  Vec3 rotor_rad_s_ = Vec3::Zero();  // while anything slips
 };
 
 }  // namespace equipoise

@@ -219,13 +219,7 @@ TEST(MbbrDisturbance, BacklashDelaysTheStartAndTheEncodersSeeTheMotor) {
   EXPECT_NEAR(ahead, 0.05 * std::sqrt(3.0) * robot.r_w / robot.r, 1e-3);
 }
 
-TEST(MbbrDisturbance, GripLimitsTheTorqueAndTheMotorRunsAhead) {
-  const Grip held = limit_by_grip(0.02, 0.05, 0.0016);
-  EXPECT_EQ(held.torque_N_m, 0.02);
-  EXPECT_EQ(held.slip_rad_s, 0.0);
-  const Grip slips = limit_by_grip(-0.08, 0.05, 0.0015);
-  EXPECT_EQ(slips.torque_N_m, -0.05);
-  EXPECT_NEAR(slips.slip_rad_s, -20.0, 1e-9);
+TEST(MbbrDisturbance, GripIsFrictionUnderALoadThatTheLatitudeMultiplies) {
   // (2.2): m g / (3 cos 60 deg) = 3.593 N per wheel
   EXPECT_NEAR(grip_limit_N_m(0.5, MbbrParameters()), 0.5 * 3.5933 * 0.0125, 1e-5);
 }
