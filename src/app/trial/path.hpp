@@ -1,7 +1,6 @@
 // Paths to drive: where the robot is to be, and how it is to move, at any time. In: name or file of waypoints
 // -> out: position, heading and their rates, continuous; a path begins and ends at rest. Named paths go on
-// for ever. W: x, y of the room as at the path's start; yaw about the vertical. Start-up allocates, `at` does
-// not.
+// for ever. W: world frame as at the path's start; yaw about the vertical. Start-up allocates, `at` does not.
 #pragma once
 
 #include <memory>

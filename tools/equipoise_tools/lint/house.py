@@ -67,7 +67,7 @@ def short_files(tree: Tree) -> list[Finding]:
             lines = tree.text(name).count("\n")
             if lines > LONGEST_FILE:
                 findings.append(
-                    Finding(name, 0, f"has {lines} lines, more than {LONGEST_FILE}: split the room")
+                    Finding(name, 0, f"has {lines} lines, more than {LONGEST_FILE}: split it")
                 )
     return findings
 

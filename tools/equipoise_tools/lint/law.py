@@ -1,4 +1,4 @@
-"""The dependency law of the rooms (docs/contributing.md): who may include whom."""
+"""The dependency rules of the modules (docs/contributing.md): who may include whom."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from .tree import C_SUFFIXES, Finding, Tree
 
 STAGES = ("sense", "estimate", "control", "actuate")
-# What a stage may include of ours besides its room: values.
+# What a stage may include of ours besides its folder: values.
 STAGE_MAY_INCLUDE = re.compile(r"equipoise/(types|samples|config)\.hpp")
-# Files that may include more than one stage room, and why.
+# Files that may include more than one stage folder, and why.
 JOINS_STAGES = {
     "include/equipoise/pipeline.hpp": "it is the tick",
     "src/config/common_config.hpp": "it reads every stage's parameters",
-    "include/equipoise/plant/world.hpp": "it plays sensors and motors from their stages' parameters",
+    "include/equipoise/plant/world.hpp": "it simulates sensors and motors from their stages' parameters",
 }
 # A robot composes stages; the application runs the whole.
 MAY_JOIN_STAGES = ("src/robots/", "src/app/", "src/main.cpp")
@@ -49,11 +49,11 @@ def is_core(name: str) -> bool:
         return not name.startswith("include/equipoise/runtime/")
     if re.fullmatch(r"src/robots/\w+/config\.cpp", name):  # a robot's configuration reader
         return False
-    return name.startswith(tuple(f"src/{room}/" for room in ("robots", "plant", *STAGES)))
+    return name.startswith(tuple(f"src/{folder}/" for folder in ("robots", "plant", *STAGES)))
 
 
-def room_of(name: str) -> str | None:
-    """The stage room that a file belongs to, if any."""
+def stage_of(name: str) -> str | None:
+    """The stage that a file belongs to, if any."""
     match = re.match(rf"(?:include/equipoise|src)/({'|'.join(STAGES)})/", name)
     return match[1] if match else None
 
@@ -86,8 +86,8 @@ def check_includes(tree: Tree) -> list[Finding]:
     sources = [name for name in tree.ending(*C_SUFFIXES) if name.startswith(("include/", "src/"))]
     drivers = {name.removeprefix("drivers/") for name in tree.ending(".h") if name.startswith("drivers/")}
     for name in sources:
-        room = room_of(name)
-        stages_joined = {room} if room else set()
+        own = stage_of(name)
+        stages_joined = {own} if own else set()
         for line, header, angle in includes(tree.text(name)):
             reason = outside_core(header, angle, drivers) if is_core(name) else None
             if reason:
@@ -97,8 +97,8 @@ def check_includes(tree: Tree) -> list[Finding]:
                     Finding(name, line, f"includes {header}: only src/app joins core and drivers")
                 )
             stage = stage_included(header)
-            if room and not angle and stage != room and not STAGE_MAY_INCLUDE.fullmatch(header):
-                message = f"includes {header}: a stage knows types, samples, robots and its own room"
+            if own and not angle and stage != own and not STAGE_MAY_INCLUDE.fullmatch(header):
+                message = f"includes {header}: a stage knows types, samples, robots and its own folder"
                 findings.append(Finding(name, line, message))
             elif stage and not name.startswith(MAY_JOIN_STAGES) and name not in JOINS_STAGES:
                 stages_joined.add(stage)
@@ -123,7 +123,7 @@ def check_robot_switch(tree: Tree) -> list[Finding]:
 
 
 def check_one_loop(tree: Tree) -> list[Finding]:
-    """What is tested is what flies: only the loop calls a pipeline's tick."""
+    """What is tested is what runs: only the loop calls a pipeline's tick."""
     findings = []
     for name in tree.ending(".cpp", ".hpp"):
         if not name.startswith(("include/", "src/", "tests/")) or name in (THE_LOOP, THE_FIRMWARE):
