@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <mutex>
 
 #include "app/remote/event_device.hpp"
 #include "app/remote/frame_device.hpp"
@@ -231,6 +232,15 @@ TEST_F(EventRemote, SticksAndKeysMove) {
   EXPECT_TRUE(device.look(0).disarm);
 }
 
+TEST_F(EventRemote, AStickBeyondItsRangeIsAtItsEnd) {
+  EventDevice device(file_);
+  put(EV_ABS, ABS_Y, kCentre);
+  put(EV_ABS, ABS_Y, -400);
+  EXPECT_EQ(device.look(0).forward, 1.0);
+  put(EV_KEY, KEY_S, 1);
+  EXPECT_EQ(device.look(0).forward, 0.0) << "one forward and one back";
+}
+
 TEST_F(EventRemote, AStickWhosePastIsUnknownWaitsUntilItIsAtRest) {
   EventDevice device(file_);
   put(EV_ABS, ABS_Y, kCentre);
@@ -258,7 +268,10 @@ TEST_F(EventRemote, UnpluggedItIsVoidAndItComesBack) {
   const Hand gone = device.look(0);
   EXPECT_FALSE(gone.present || gone.heard);
   EXPECT_EQ(gone.forward, 0.0);
-  EXPECT_FALSE(device.look(0).present);
+  const auto began = std::chrono::steady_clock::now();
+  EXPECT_FALSE(device.look(30).present);
+  EXPECT_GE(std::chrono::steady_clock::now() - began, std::chrono::milliseconds(30))
+      << "it waits between tries";
   plug_in();
   EXPECT_TRUE(device.look(0).present);
   put(EV_ABS, ABS_Y, kUp);
@@ -323,6 +336,38 @@ TEST_F(EventRemote, FliesAndItsLossStopsTheMotionButNotTheMotors) {
   EXPECT_TRUE(flight.wait([](const Command& c) { return c.age_s < Flight::kTimeout_s; }));
   put(EV_KEY, BTN_EAST, 1);
   EXPECT_TRUE(flight.wait([](const Command& c) { return !c.arm; }));
+}
+
+TEST_F(EventRemote, WhatHappensIsSaidOnce) {
+  std::mutex lock;
+  std::vector<std::string> said;
+  const auto journal = [&](const std::string& what) {
+    const std::lock_guard<std::mutex> guard(lock);
+    said.push_back(what);
+  };
+  HandRemote remote(open_hand(file_), {0.2, 0.5, 0.5, journal});
+  const auto comes = [&](const std::vector<std::string>& all) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+    while (std::chrono::steady_clock::now() < end) {
+      {
+        const std::lock_guard<std::mutex> guard(lock);
+        if (said == all) return true;
+      }
+      usleep(2000);
+    }
+    return false;
+  };
+  put(EV_KEY, BTN_START, 1);
+  EXPECT_TRUE(comes({"the remote asks for the motors"}));
+  unplug();
+  EXPECT_TRUE(comes({"the remote asks for the motors", "the remote is gone: nothing moves"}));
+  usleep(100000);
+  plug_in();
+  const std::vector<std::string> all{"the remote asks for the motors", "the remote is gone: nothing moves",
+                                     "the remote is back"};
+  EXPECT_TRUE(comes(all));
+  usleep(100000);
+  EXPECT_TRUE(comes(all));
 }
 
 TEST_F(EventRemote, AnArmThatWasNotObeyedInTimeIsForgotten) {

@@ -205,6 +205,25 @@ MbbrScheduledFeedbackParams scheduled_params() {
   return p;
 }
 
+TEST(MbbrScheduledFeedback, TurnsByTheErrorsOfHeadingAndYawRate) {
+  MbbrScheduledFeedbackParams p;
+  p.gains = design_mbbr(MbbrParameters{}, MbbrDesignParams{});
+  p.gains.yaw_angle = 2.0;
+  p.gains.yaw_rate = 0.5;
+  p.gains.yaw_feedforward = 0.125;
+  const auto u_z = [&p](double MbbrReference::*what, double value) {
+    MbbrReference ref;
+    ref.*what = value;
+    return MbbrScheduledFeedback(p).update(ref).z();
+  };
+  p.yaw_feedforward = true;
+  EXPECT_EQ(u_z(&MbbrReference::d_theta_z, 0.25), -0.5);
+  EXPECT_EQ(u_z(&MbbrReference::d_yaw_rate, 3.0), -1.5);
+  EXPECT_EQ(u_z(&MbbrReference::yaw_rate, 4.0), 0.5);
+  p.yaw_feedforward = false;
+  EXPECT_EQ(u_z(&MbbrReference::yaw_rate, 4.0), 0.0);
+}
+
 TEST(MbbrScheduledFeedback, CrossGainsGrowWithTheSpinAndMirrorWithItsSign) {
   MbbrScheduledFeedback feedback(scheduled_params());
   const auto cross = [&](double hz) {
