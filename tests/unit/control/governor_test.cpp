@@ -28,6 +28,17 @@ TEST(SmoothVelocity, ReachesTheTargetWithinItsLimitsAndWithoutOvershoot) {
   EXPECT_LT(v.acceleration().norm(), 1e-6);
 }
 
+/// Where the jerk is small against the acceleration, all of it is needed to take that back in time.
+TEST(SmoothVelocity, TakesItsAccelerationBackBeforeTheTarget) {
+  SmoothVelocity<1> v;
+  for (int k = 0; k < 4000; ++k) {
+    v.update(Vec<1>(10.0), {4.0, 1.0});
+    ASSERT_GE(v.acceleration()(0), -1e-6) << k;
+    ASSERT_LE(v.velocity()(0), 10.0 + 1e-6) << k;
+  }
+  EXPECT_NEAR(v.velocity()(0), 10.0, 1e-6);
+}
+
 TEST(SmoothVelocity, StaysWithinItsLimitsWhenTheTargetJumps) {
   SmoothVelocity<2> v;
   Vec2 before = Vec2::Zero();

@@ -210,6 +210,14 @@ TEST(MipSlcFeedback, GrowsToItsLimitOverTheSoftStart) {
   expect_a_soft_start<MipSlcFeedback>(p, -3.0);
 }
 
+TEST(MipSlcFeedback, WithoutASoftStartItsLimitIsThereAtOnce) {
+  MipSlcParams p;
+  p.gains.slc.D1 = {-10.0, 0.0, 0.0, 0.0, 0.0};
+  p.max_u = 1.0;
+  p.soft_start_s = 0.0;
+  EXPECT_EQ(MipSlcFeedback(p).update(one_error(&MipReference::d_theta, -3.0)).x(), 1.0);
+}
+
 /// y(k) = b0 e(k) + b1 e(k-1) + b2 e(k-2) - a1 y(k-1) - a2 y(k-2)
 TEST(MipSlcFeedback, IsTheDifferenceEquationOfItsTwoLoops) {
   MipSlcParams p;
