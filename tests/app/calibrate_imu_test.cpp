@@ -51,6 +51,20 @@ TEST(GyroBias, RefusesMotionAndSaysHowMuch) {
               HasSubstr("wheel 2 turned by 12 counts"));
 }
 
+/// 0.4 deg/s of shaking and 0.1 of change are a chip's noise, 25 deg/s its bias; beyond, the robot moved.
+TEST(GyroBias, TakesWhatAChipDoesAtRest) {
+  const auto told = [](double sigma, double drift, double bias) {
+    Stillness still = at_rest({0.0, 0.0, bias * 16.4});
+    still.gyro_sigma.setConstant(sigma * 16.4);
+    still.gyro_drift.setConstant(drift * 16.4);
+    return complaint([&] { gyro_bias(still, Calibration{}); });
+  };
+  EXPECT_EQ(told(0.39, 0.09, 24.9), "accepted");
+  EXPECT_THAT(told(0.41, 0.09, 24.9), HasSubstr("of shaking"));
+  EXPECT_THAT(told(0.39, 0.11, 24.9), HasSubstr("of change"));
+  EXPECT_THAT(told(0.39, 0.09, 25.1), HasSubstr("is no bias"));
+}
+
 // A chip that reads (force + bias) / scale per axis.
 const Vec3 kScale(0.97, 1.02, 1.05);
 const Vec3 kBias(0.3, -0.2, 0.5);

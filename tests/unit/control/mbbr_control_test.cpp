@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <complex>
+
 #include "equipoise/control/friction.hpp"
 #include "robots/mbbr/scheduled_feedback.hpp"
 #include "robots/mbbr/thesis_feedback.hpp"
@@ -235,6 +237,35 @@ TEST(MbbrScheduledFeedback, CrossGainsGrowWithTheSpinAndMirrorWithItsSign) {
   EXPECT_NEAR(cross(0.0), 0.0, 1e-12);
   EXPECT_GT(std::abs(cross(3.0)), std::abs(cross(1.0)));
   EXPECT_NEAR(cross(2.0), -cross(-2.0), 1e-12);
+}
+
+/// Every error by itself dies out in the linear model, in which each gain has its part.
+TEST(MbbrScheduledFeedback, BringsEveryErrorOfTheLinearModelToRest) {
+  const MbbrParameters robot;
+  MbbrScheduledFeedbackParams p;
+  p.gains = design_mbbr(robot, MbbrDesignParams{});
+  const MbbrLinear s = mbbr_linear(robot, 0.0);
+  const auto as_vector = [](std::complex<double> z) { return Vec2(z.real(), z.imag()); };
+  for (int state = 0; state < 4; ++state) {
+    MbbrScheduledFeedback feedback(p);
+    CMatrix x = CMatrix::Zero(4, 1);
+    x(state, 0) = std::complex<double>(0.03, -0.04);
+    double most_lean = 0.0;
+    for (int k = 0; k < 10 * static_cast<int>(kTickHz); ++k) {
+      MbbrReference ref;  // at rest
+      ref.d_theta = as_vector(-x(0, 0));
+      ref.d_phi = as_vector(-x(1, 0));
+      ref.d_rate = as_vector(-x(2, 0));
+      ref.d_phi_dot_unfiltered = as_vector(-x(3, 0));
+      const Vec3 u = feedback.update(ref);
+      constexpr int kSteps = 10;
+      for (int i = 0; i < kSteps; ++i)
+        x += kTickS / kSteps * CMatrix(s.A * x + s.b * std::complex<double>(u.x(), u.y()));
+      most_lean = std::max(most_lean, std::abs(x(0, 0)));
+    }
+    EXPECT_LT(x.norm(), 2e-3) << "from state " << state;
+    EXPECT_LT(most_lean, 0.1) << "from state " << state;
+  }
 }
 
 TEST(MbbrScheduledFeedback, LeanIsCorrectedByDrivingTheBallUnderIt) {
