@@ -222,6 +222,7 @@ TEST_F(EventRemote, SticksAndKeysMove) {
   put(EV_KEY, KEY_S, 1);
   EXPECT_EQ(device.look(0).forward, 0.0) << "forward and back";
   put(EV_KEY, KEY_S, 0);
+  EXPECT_EQ(device.look(0).forward, 1.0) << "back was let go";
   put(EV_KEY, KEY_W, 0);
   EXPECT_EQ(device.look(0).forward, 0.0);
   put(EV_KEY, BTN_START, 1);

@@ -239,6 +239,20 @@ TEST(MbbrScheduledFeedback, CrossGainsGrowWithTheSpinAndMirrorWithItsSign) {
   EXPECT_NEAR(cross(2.0), -cross(-2.0), 1e-12);
 }
 
+/// At a constant acceleration of the ball the body holds a lean: both from the linear model.
+TEST(MbbrScheduledFeedback, FeedsForwardWhatAnAccelerationTakes) {
+  const MbbrParameters robot;
+  const MbbrScheduledFeedbackParams p = scheduled_params();
+  const MbbrLinear s = mbbr_linear(robot, 0.0);
+  Eigen::Matrix2d of_lean_and_u;
+  of_lean_and_u << s.A(2, 0).real(), s.b(2, 0).real(), s.A(3, 0).real(), s.b(3, 0).real();
+  const Vec2 held = of_lean_and_u.inverse() * Vec2(0.0, 5.0);  // 5 rad/s^2
+  MbbrReference ref;
+  ref.phi_ddot_star = Vec2(5.0, 0.0);
+  ref.d_theta = Vec2(-held.x(), 0.0);  // it leans as it has to
+  EXPECT_NEAR(MbbrScheduledFeedback(p).update(ref).x(), held.y(), 1e-2 * std::abs(held.y()));
+}
+
 /// Every error by itself dies out in the linear model, in which each gain has its part.
 TEST(MbbrScheduledFeedback, BringsEveryErrorOfTheLinearModelToRest) {
   const MbbrParameters robot;
