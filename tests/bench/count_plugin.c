@@ -1,6 +1,7 @@
 // qemu plugin: how many instructions the emulated program executed and how many cycles a Cortex-A8 needs for
-// them, printed when it ends. Debian's qemu-user comes without the header; these are the declarations
-// of plugin interface 1 that are needed.
+// them, in all, by function, and from tick_begins() to tick_ends() of the program (mean and most), printed
+// when it ends. Debian's qemu-user comes without the header; these are the declarations of plugin interface 1
+// that are needed.
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -12,20 +13,57 @@ struct qemu_plugin_tb;
 struct qemu_plugin_insn;
 struct qemu_info;
 enum qemu_plugin_op { QEMU_PLUGIN_INLINE_ADD_U64 };
+enum qemu_plugin_cb_flags { QEMU_PLUGIN_CB_NO_REGS };
 
 size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb* block);
 struct qemu_plugin_insn* qemu_plugin_tb_get_insn(const struct qemu_plugin_tb* block, size_t index);
 char* qemu_plugin_insn_disas(const struct qemu_plugin_insn* instruction);
+const char* qemu_plugin_insn_symbol(const struct qemu_plugin_insn* instruction);
 void qemu_plugin_register_vcpu_tb_trans_cb(qemu_plugin_id_t id,
                                            void (*call)(qemu_plugin_id_t, struct qemu_plugin_tb*));
 void qemu_plugin_register_vcpu_tb_exec_inline(struct qemu_plugin_tb* block, enum qemu_plugin_op op, void* to,
                                               uint64_t add);
+void qemu_plugin_register_vcpu_tb_exec_cb(struct qemu_plugin_tb* block, void (*call)(unsigned, void*),
+                                          enum qemu_plugin_cb_flags flags, void* data);
 void qemu_plugin_register_atexit_cb(qemu_plugin_id_t id, void (*call)(qemu_plugin_id_t, void*), void* data);
 
 __attribute__((visibility("default"))) int qemu_plugin_version = 1;
 
 static uint64_t executed;
 static uint64_t cycles;
+
+struct function {
+  char* name;
+  uint64_t cycles;
+};
+static struct function functions[8192];  // the last takes what finds no room
+static size_t known;
+
+static struct function* function_of(const char* name) {
+  if (name == NULL || *name == '\0') name = "libraries";
+  size_t i = 0;
+  while (i < known && strcmp(functions[i].name, name) != 0) ++i;
+  if (i == known && known + 1 < sizeof functions / sizeof functions[0])
+    functions[known++].name = strdup(name);
+  return &functions[i];
+}
+
+static uint64_t tick_began, ticks, in_ticks, in_worst_tick;
+
+static void tick_begins(unsigned processor, void* data) {
+  (void)processor;
+  (void)data;
+  tick_began = cycles;
+}
+
+static void tick_ends(unsigned processor, void* data) {
+  (void)processor;
+  (void)data;
+  const uint64_t took = cycles - tick_began;
+  ++ticks;
+  in_ticks += took;
+  if (took > in_worst_tick) in_worst_tick = took;
+}
 
 // Who computes: VFPLite, which is not pipelined, so that its cycles add up; NEON, which starts an instruction
 // a cycle; or neither. Upper ends of the ranges for numbers of normal size in ARM DDI 0344, Cortex-A8
@@ -129,6 +167,13 @@ static void translated(qemu_plugin_id_t id, struct qemu_plugin_tb* block) {
     }
     free(text);
   }
+  const char* const symbol = qemu_plugin_insn_symbol(qemu_plugin_tb_get_insn(block, 0));
+  struct function* const function = function_of(symbol);
+  if (strcmp(function->name, "tick_begins") == 0)
+    qemu_plugin_register_vcpu_tb_exec_cb(block, tick_begins, QEMU_PLUGIN_CB_NO_REGS, NULL);
+  if (strcmp(function->name, "tick_ends") == 0)
+    qemu_plugin_register_vcpu_tb_exec_cb(block, tick_ends, QEMU_PLUGIN_CB_NO_REGS, NULL);
+  qemu_plugin_register_vcpu_tb_exec_inline(block, QEMU_PLUGIN_INLINE_ADD_U64, &function->cycles, clock.now);
   qemu_plugin_register_vcpu_tb_exec_inline(block, QEMU_PLUGIN_INLINE_ADD_U64, &executed, count);
   qemu_plugin_register_vcpu_tb_exec_inline(block, QEMU_PLUGIN_INLINE_ADD_U64, &cycles, clock.now);
 }
@@ -138,6 +183,11 @@ static void finished(qemu_plugin_id_t id, void* data) {
   (void)data;
   fprintf(stderr, "instructions %llu\ncycles %llu\n", (unsigned long long)executed,
           (unsigned long long)cycles);
+  if (ticks > 0)
+    fprintf(stderr, "tick %llu most %llu\n", (unsigned long long)(in_ticks / ticks),
+            (unsigned long long)in_worst_tick);
+  for (size_t i = 0; i < known; ++i)
+    fprintf(stderr, "function %llu %s\n", (unsigned long long)functions[i].cycles, functions[i].name);
 }
 
 __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t id,

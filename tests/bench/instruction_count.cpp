@@ -2,7 +2,9 @@
 // usage: instruction_count ROBOT CONFIG PART TIMES
 //   run      ticks of the simulated robot and the pipeline, armed after 100, turning at 1 Hz
 //   ticks    the same, and the recorded samples once more through a fresh pipeline
-//   filters  the same; says how often the default filter ran, with the bank that looks for a lying encoder
+//   mode-M   ticks in mode M, played again; count_plugin.c looks at the later half of them, which lie between
+//            tick_begins() and tick_ends()
+//   filters  ticks; says how often the default filter ran, with the bank that looks for a lying encoder
 //   plant-F  ticks of the simulated robot alone, F: its fidelity; it starts anew before it has fallen
 //   packed   steps of the default filter as it runs
 //   dense    the same steps of the same model in KalmanFilter, Eigen
@@ -24,6 +26,12 @@
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/recorded_samples.hpp"
 #include "robots/robot_list.hpp"
+
+// Defined here alone, not inlined: the plugin finds them by name.
+extern "C" {
+[[gnu::noinline]] void tick_begins() { asm volatile(""); }
+[[gnu::noinline]] void tick_ends() { asm volatile(""); }
+}
 
 namespace equipoise {
 namespace {
@@ -89,6 +97,87 @@ void ticks(const std::string& file, int times, const std::string& part) {
     }
   });
   if (part == "filters") std::fprintf(stderr, "filters %ld\n", filters);
+}
+
+/// What a robot does, and what happens to it in the tick from which on ticks are counted.
+struct Mode {
+  const char* name;
+  double drive_m_s = 0.0;
+  double yaw_hz = 0.0;
+  int missed = 0;                                                         // ticks, once
+  void (*distort)(RawSample& sample, const RawSample& before) = nullptr;  // from then on
+};
+
+constexpr Mode kModes[] = {
+    {"disarmed"},
+    {"arming"},
+    {"standing"},
+    {"driving", 0.2},
+    {"turning", 0.0, 1.0},
+    {"fast", 0.1, 3.0},
+    {"stall", 0.1, 1.0, 13},  // longer, and the motors are off
+    {"no_imu", 0.1, 0.0, 0,
+     [](RawSample& s, const RawSample&) { s.valid &= ~static_cast<decltype(s.valid)>(RIO_IMU); }},
+    {"encoder", 0.1, 1.0, 0,
+     [](RawSample& s, const RawSample& b) { s.encoder_counts[0] = b.encoder_counts[0]; }},
+    {"gyro", 0.1, 1.0, 0, [](RawSample& s, const RawSample& b) { s.gyro_counts[0] = b.gyro_counts[0]; }},
+};
+
+/// A world in a mode.
+template <class World>
+struct ModeIo : WorldIo<World> {
+  const Mode& mode;
+  int from;
+  int tick = 0;
+
+  int wait_tick(std::int64_t* now_ns) noexcept {
+    if (tick++ == from)
+      for (int i = 0; i < mode.missed; ++i) this->world.advance(this->motors);
+    const int result = WorldIo<World>::wait_tick(now_ns);
+    if (result == 0 && tick > from && mode.distort != nullptr)
+      mode.distort(this->samples.back(), this->samples.rbegin()[1]);
+    return result;
+  }
+};
+
+template <class Firmware>
+void in_mode(const std::string& file, int times, const std::string& name) {
+  const Mode* mode = nullptr;
+  for (const Mode& m : kModes) mode = name == m.name ? &m : mode;
+  if (mode == nullptr) throw std::runtime_error(name + ": no mode");
+  Choice choice;
+  choice.estimator = Firmware::kDefaultEstimator;
+  choice.controller = Firmware::kDefaultController;
+  choice.fidelity = "built2025";
+  const auto config = Firmware::apply(Firmware::load(file, {}).config, choice);
+  const auto commands = [mode](std::int64_t tick, std::int64_t) {
+    Command command;
+    command.arm = mode != kModes && tick >= kArmTick;
+    command.velocity_W_m_s.x() = mode->drive_m_s;
+    command.yaw_rate_rad_s = tick > 2 * kArmTick ? 2.0 * kPi * mode->yaw_hz : 0.0;
+    return command;
+  };
+  const int from = name == "arming" ? kArmTick : times / 2;
+  auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);
+  runtime::RecordedSamples recording;
+  recording.samples.reserve(static_cast<std::size_t>(times));
+  const std::atomic<bool> never{false};
+  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    ModeIo<decltype(world)> io{{world, recording.samples, times}, *mode, from};
+    (void)runtime::run_loop(
+        io, pipeline, commands, [](auto&&...) {}, never);
+  });
+  Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
+    const auto begins = [&](std::int64_t tick, std::int64_t now_ns) {
+      const Command command = commands(tick, now_ns);
+      if (tick >= from) tick_begins();
+      return command;
+    };
+    const auto ends = [from](std::int64_t tick, auto&&...) {
+      if (tick >= from) tick_ends();
+    };
+    (void)runtime::run_loop(recording, pipeline, begins, ends, never);
+  });
 }
 
 template <class Firmware>
@@ -186,11 +275,12 @@ void bridges(const std::string& how, int times) {
 template <class Firmware>
 void count(const std::string& file, const std::string& part, int times) {
   if (part == "run" || part == "ticks" || part == "filters") return ticks<Firmware>(file, times, part);
+  if (part.rfind("mode-", 0) == 0) return in_mode<Firmware>(file, times, part.substr(5));
   if (part.rfind("plant-", 0) == 0) return plant<Firmware>(file, part.substr(6), times);
   if (part == "packed" || part == "dense") return filter(file, part, times, Firmware{});
   if (part == "bridge" || part == "newton") return bridges(part, times);
-  throw std::runtime_error(part +
-                           ": no part; run, ticks, filters, plant-FIDELITY, packed, dense, bridge or newton");
+  throw std::runtime_error(
+      part + ": no part; run, ticks, mode-MODE, filters, plant-FIDELITY, packed, dense, bridge or newton");
 }
 
 }  // namespace

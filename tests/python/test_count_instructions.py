@@ -44,6 +44,25 @@ def test_a_profile_is_split_into_the_stages_of_the_tick():
     }
 
 
+def test_a_functions_cycles_are_its_stages():
+    said = """instructions 5
+function 300 _ZN9equipoise6Safety4gateERK12rio_motors_tRKNS_12SafetyInputsE
+function 40 _ZNK9equipoise17DriveCoastInverse5solveEdd
+function 2 _ZNK9equipoise17DriveCoastInverse5solveEdd
+function 1 libraries
+function 5 _ZN9equipoise9generated10MbbrFilter7predictERKNS1_9ConstantsIfEEPKfPfS7_
+function 7 memcpy
+"""
+    stages = count.stages_of(count.by_function(said))
+    assert {k: v for k, v in stages.items() if v} == {
+        "estimate": 5,
+        "bridge": 42,
+        "safety": 300,
+        "libraries": 1,
+        "rest": 7,
+    }
+
+
 @pytest.fixture(scope="module")
 def committed(root):
     return json.loads((root / count_page.TABLE).read_text(encoding="utf-8"))

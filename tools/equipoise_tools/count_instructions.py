@@ -12,16 +12,29 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
-from .count_page import PAGE, ROBOTS, STAGES, TABLE, TICK_HZ, firmware_table, table, write_page
+from .count_page import (
+    MODES,
+    PAGE,
+    ROBOTS,
+    STAGES,
+    TABLE,
+    TICK_HZ,
+    cycle_tables,
+    firmware_table,
+    table,
+    write_page,
+)
 from .entry import leave
 from .paths import UserError, repository_root
 
 TICKS = (600, 1000)  # after arming, when the isolation's bank runs under suspicion only
 STEPS = (200, 600)
 INVERSIONS = (6400, 19200)
+MODE_TICKS = 800
 LOGGED_S = (2, 5)
 LOAD_LOG = Path("build/vm/console-load.log")  # what tools/vm-test load leaves
 NUMBER = re.compile(r"(\+|-)?\d+|\*")
@@ -87,14 +100,51 @@ class CortexA8:
         """How they are taken is said in count_plugin.c."""
         return self._counts(robot, part, times)["cycles"]
 
-    @cache  # noqa: B019 - one machine per run, and its counts are few
+    def stages(self, robot: str) -> dict[str, int]:
+        """Cycles of an armed tick by stage."""
+        per_tick: Counter[str] = Counter()
+        for times, sign in zip(TICKS, (-1, 1), strict=True):
+            for part, more in (("ticks", sign), ("run", -sign)):
+                for name, cycles in by_function(self._said(robot, part, times)).items():
+                    per_tick[name] += more * cycles
+        return {k: round(v / (TICKS[1] - TICKS[0])) for k, v in stages_of(per_tick).items()}
+
+    def mode(self, robot: str, mode: str) -> dict[str, int]:
+        """Mean and most cycles of a tick."""
+        found = re.search(r"^tick (\d+) most (\d+)$", self._said(robot, f"mode-{mode}", MODE_TICKS), re.M)
+        if found is None:
+            raise UserError(f"mode {mode} of {robot} has no ticks")
+        return {"mean": int(found[1]), "most": int(found[2])}
+
     def _counts(self, robot: str, part: str, times: int) -> dict[str, int]:
-        command = ["qemu-arm", "-cpu", "cortex-a8", "-L", str(self.sysroot), "-plugin", str(self.plugin)]
-        said = _run([*command, str(self.program), robot, ROBOTS[robot], part, str(times)], self.root)
-        found = dict(re.findall(r"^(instructions|cycles) (\d+)$", said, re.M))
+        found = dict(re.findall(r"^(instructions|cycles) (\d+)$", self._said(robot, part, times), re.M))
         if len(found) != 2:
             raise UserError("qemu-arm's plugin said nothing; is qemu-user built with plugins?")
         return {k: int(v) for k, v in found.items()}
+
+    @cache  # noqa: B019 - one machine per run, and its counts are few
+    def _said(self, robot: str, part: str, times: int) -> str:
+        command = ["qemu-arm", "-cpu", "cortex-a8", "-L", str(self.sysroot), "-plugin", str(self.plugin)]
+        return _run([*command, str(self.program), robot, ROBOTS[robot], part, str(times)], self.root)
+
+
+def by_function(said: str) -> Counter[str]:
+    """Cycles of each function that the plugin named."""
+    found = re.findall(r"^function (\d+) (.*)$", said, re.M)
+    mangled = "\n".join(name for _, name in found)
+    names = subprocess.run(["c++filt"], input=mangled, capture_output=True, text=True, check=True).stdout
+    result: Counter[str] = Counter()
+    for (cycles, _), name in zip(found, names.splitlines(), strict=True):
+        result[name] += int(cycles)
+    return result
+
+
+def stages_of(functions: dict[str, int]) -> dict[str, int]:
+    """A function's cycles, with those of what is inlined into it, are its stage's."""
+    stages = dict.fromkeys([*STAGES, "libraries", "rest"], 0)
+    for name, cycles in functions.items():
+        stages[name if name == "libraries" else _stage(_plain(name))] += cycles
+    return stages
 
 
 def _filters(command: list[str], folder: Path) -> int:
@@ -199,6 +249,22 @@ def costs(machine, robot: str) -> dict:
     }
 
 
+def cycles(machine: CortexA8, robot: str, filters: float) -> dict:
+    ticks, run = (per(machine.cycles, robot, part, TICKS) for part in ("ticks", "run"))
+    packed, dense = (per(machine.cycles, robot, part, STEPS) for part in ("packed", "dense"))
+    tick = ticks - run
+    dense_tick = tick + filters * (dense - packed)
+    return {
+        "tick_cycles": round(tick),
+        "filter_cycles": round(packed),
+        "dense_filter_cycles": round(dense),
+        "dense_tick_cycles": round(dense_tick),
+        "cycles_ratio": round(tick / dense_tick, 4),
+        "stage_cycles": machine.stages(robot),
+        "modes": {mode: machine.mode(robot, mode) for mode in MODES},
+    }
+
+
 def counted(machine) -> dict:
     result: dict = {}
     for robot in ROBOTS:
@@ -211,9 +277,7 @@ def counted(machine) -> dict:
         result[robot]["ratio"] = round(cost["tick"] / dense_tick, 4)
         result[robot]["stages"] = stages and {k: round(v) for k, v in stages.items()}
         if isinstance(machine, CortexA8):
-            run_cycles = per(machine.cycles, robot, "run", TICKS)
-            result[robot]["tick_cycles"] = round(per(machine.cycles, robot, "ticks", TICKS) - run_cycles)
-            result[robot]["filter_cycles"] = round(per(machine.cycles, robot, "packed", STEPS))
+            result[robot] |= cycles(machine, robot, cost["filters"])
     ours, newton = (per(machine.total, "mbbr", how, INVERSIONS) for how in ("bridge", "newton"))
     result["bridge"] = {"inversion": round(ours), "newton": round(newton), "ratio": round(ours / newton, 4)}
     return result
@@ -265,6 +329,8 @@ def main() -> int:
             print("\n".join(firmware_table(counts["firmware"], counts["cortex_a8"])))
         if counts["cortex_a8"] is None:
             print(f"Cortex-A8: not counted ({counts['cortex_a8_missing']})")
+        else:
+            print("\n".join(cycle_tables(counts["cortex_a8"])))
     return 0
 
 

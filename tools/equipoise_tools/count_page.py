@@ -17,11 +17,25 @@ CYCLES_OUTSIDE = (2, 3, 4)
 # Where a line of the tick belongs: by its file, or, of a call in the tick itself, by the function.
 STAGES = {
     "sense": r"/sense/|Senses|attitude_filter",
-    "estimate": r"/estimate/|stimators|/ekf\.",
+    "estimate": r"/estimate/|stimators|/ekf\.|Ekf|Filter|downdate|correct|Watch|Isolation",
     "reference": r"reference\.[ch]|Reference",
     "control": r"/control/|eedback|friction",
     "bridge": r"bridge|drive_coast|DriveCoast|Bridge|within_supply|allocate",
     "safety": r"safety|Safety|encoder_check|EncoderCheck",
+}
+
+# Of tests/bench/instruction_count.cpp.
+MODES = {
+    "disarmed": "motors off",
+    "arming": "from arming on",
+    "standing": "standing",
+    "driving": "driving, 0.2 m/s",
+    "turning": "turning, 1 Hz",
+    "fast": "turning, 3 Hz, and driving, 0.1 m/s",
+    "stall": "13 ticks missed, then caught up",
+    "no_imu": "without IMU samples",
+    "encoder": "an encoder stops counting",
+    "gyro": "a gyro axis stands still",
 }
 
 
@@ -60,15 +74,44 @@ def table(counts: dict) -> list[str]:
     return lines
 
 
-def a8_load(robots: dict) -> list[str]:
-    """What the Cortex-A8's counts mean for its load."""
-    cycles = ", ".join(f"{robots[r]['tick_cycles']:,} ({r})" for r in ROBOTS)
-    filters = ", ".join(f"{robots[r]['filter_cycles']:,} ({r})" for r in ROBOTS)
-    load = ", ".join(f"{robots[r]['tick_cycles'] * TICK_HZ / CLOCK_HZ:.1%} ({r})" for r in ROBOTS)
+def cycle_tables(robots: dict) -> list[str]:
+    """The Cortex-A8's cycles: of a tick by stage, and of the longest tick of every mode."""
+
+    def row(label: str, cell) -> str:
+        return f"| {label} | " + " | ".join(cell(robots[r]) for r in ROBOTS) + " |"
+
     return [
         "",
-        f"A Cortex-A8 needs about {cycles} cycles for a tick, of them {filters} for the filter; that is "
-        f"{load} of 1 GHz at 200 Hz. VFPLite is not pipelined, so that the cycles of its instructions "
+        "## Cycles of a Cortex-A8",
+        "| cycles per tick, turning at 1 Hz | mbbr | mip |",
+        "|---|---|---|",
+        row("tick", lambda r: f"{r['tick_cycles']:,}"),
+        row("the default filter", lambda r: f"{r['filter_cycles']:,}"),
+        row("the same filter, dense Eigen, double", lambda r: f"{r['dense_filter_cycles']:,}"),
+        row("tick with dense filters", lambda r: f"{r['dense_tick_cycles']:,}"),
+        row("tick over that", lambda r: f"{r['cycles_ratio']:.4f}"),
+        row("load of 1 GHz by the tick", lambda r: f"{r['tick_cycles'] * TICK_HZ / CLOCK_HZ:.1%}"),
+        *(
+            row(f"stage: {stage}", lambda r, stage=stage: f"{r['stage_cycles'][stage]:,}")
+            for stage in robots["mbbr"]["stage_cycles"]
+        ),
+        "",
+        "| cycles of a tick: mean, longest | mbbr | mip |",
+        "|---|---|---|",
+        *(
+            row(label, lambda r, mode=mode: f"{r['modes'][mode]['mean']:,}, {r['modes'][mode]['most']:,}")
+            for mode, label in MODES.items()
+        ),
+    ]
+
+
+def a8_load(robots: dict) -> list[str]:
+    """How the Cortex-A8's cycles are taken."""
+    return [
+        *cycle_tables(robots),
+        "",
+        "A function's cycles belong to its stage with what the compiler has inlined into it; libraries: "
+        "sine, exponential, copies. VFPLite is not pipelined, so that the cycles of its instructions "
         "add up: the upper ends of the ranges in ARM DDI 0344, Table 16.25 (of doubles: addition 10, "
         "multiplication 17, with a sum 26, division 65). NEON starts an instruction a cycle and waits for "
         "results, 5 cycles or 9 of a multiplication with a sum, as in GCC's cortex-a8-neon.md. A register to "
