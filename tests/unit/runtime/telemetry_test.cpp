@@ -1,7 +1,13 @@
-// Records that find no room are counted, and the run's report says how many.
+// Records that find no room are counted, and the run's report says how many; what is published is for eyes.
 #include "equipoise/runtime/telemetry.hpp"
 
 #include <gtest/gtest.h>
+
+#include <chrono>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <thread>
 
 #include "support/log_folder.hpp"
 
@@ -24,6 +30,28 @@ TEST_F(TelemetryTest, WhatFindsNoRoomIsReported) {
   const TelemetryReport report = telemetry.finish(EndRecord{});
   EXPECT_GT(report.dropped, 0);
   EXPECT_EQ(report.records + report.dropped, kTicks);
+}
+
+/// A message costs its packet and the kernel's way: with 8 a record, more than everything else that is
+/// logged.
+TEST_F(TelemetryTest, PublishesNoMoreOftenThanItIsAskedTo) {
+  TelemetryOptions options;
+  options.url = "file://" + path_ + "?mode=w";
+  const auto start = std::chrono::steady_clock::now();
+  Telemetry telemetry(options);
+  TickRecord record{};
+  for (record.tick = 1; record.tick <= 100; ++record.tick) {
+    telemetry.hand_over(record);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  (void)telemetry.finish(EndRecord{});
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  std::ifstream file(path_, std::ios::binary);
+  const std::string published{std::istreambuf_iterator<char>(file), {}};
+  int states = 0;
+  for (std::size_t at = 0; (at = published.find("EQUIPOISE_STATE", at)) != std::string::npos; ++at) ++states;
+  EXPECT_GE(states, 2);
+  EXPECT_LE(states, 25.0 * took.count() + 1.0);
 }
 
 }  // namespace
