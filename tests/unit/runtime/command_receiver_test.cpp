@@ -182,6 +182,9 @@ TEST_F(Receiver, NotesWhoBeganWhichTurn) {
   for (const std::int8_t action :
        {signed_command_t::ARM, signed_command_t::DISARM, signed_command_t::HEADING_RESET})
     ask(command(action));
+  // The answer goes out before the note.
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (journal().size() < 3 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
   EXPECT_EQ(journal(), (std::vector<std::string>{"anna asks for the motors", "anna disarms",
                                                  "anna resets the heading"}));
 }

@@ -66,9 +66,7 @@ def short_files(tree: Tree) -> list[Finding]:
         if name.endswith((".c", ".h", ".cpp", ".hpp", ".py")) and not is_generated(name):
             lines = tree.text(name).count("\n")
             if lines > LONGEST_FILE:
-                findings.append(
-                    Finding(name, 0, f"has {lines} lines, more than {LONGEST_FILE}: split it")
-                )
+                findings.append(Finding(name, 0, f"has {lines} lines, more than {LONGEST_FILE}: split it"))
     return findings
 
 
