@@ -13,6 +13,7 @@
 #include <cstring>
 #include <iterator>
 #include <memory>
+#include <type_traits>
 #include <variant>
 
 #include "equipoise/estimate/downdate.hpp"
@@ -142,7 +143,7 @@ class PackedFilter {
     on_core(core_, [&](auto& core) {
       equipoise::correct<n, m>(core.step, core.Ph, core.x.data());
       downdate<n, m>(core.weight, core.Ph, core.P.data());
-      restore(core);
+      if constexpr (std::is_same_v<RealOf<decltype(core)>, float>) restore(core);  // double keeps the digits
       keep_small(core);
       show(core);
     });
