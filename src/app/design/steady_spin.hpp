@@ -81,7 +81,7 @@ class SettledControllerOf : public SettledController {
     command_.yaw_rate_rad_s = yaw_rate_rad_s;
     constexpr int kSettleTicks = 1200;  // the filters' gains are steady then
     const int ramp = static_cast<int>(std::ceil(std::abs(yaw_rate_rad_s) / yaw_step_));
-    for (int k = 0; k < ramp + kSettleTicks; ++k) step({}, {});
+    for (int k = 0; k < ramp + kSettleTicks; ++k) SettledControllerOf::step({}, {});
   }
 
   std::unique_ptr<SettledController> copy() const override {
