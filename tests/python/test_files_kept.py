@@ -67,6 +67,8 @@ def test_json_replaces_json_only(do, log, root, tmp_path):
     sim = ["sim", "--config", "robot.toml", "--duration-s", "1", "--log", "off", "--json"]
     assert "holds no JSON" in do("replay", "x.lcm", "--json", "x.lcm", status=2)
     assert "holds no JSON" in do(*sim, "robot.toml", status=2)
+    (tmp_path / "blank.txt").write_text(100 * " " + "mine")
+    assert "holds no JSON" in do(*sim, "blank.txt", status=2)
     assert log.read_bytes() == before
     do(*sim, "out.json", status=0)
     do(*sim, "out.json", status=0)

@@ -47,10 +47,10 @@ std::string output_error(const std::string& path, const std::vector<std::string>
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return "";
   std::ifstream file(path, std::ios::binary);
+  file >> std::ws;
   std::string begin(64, '\0');
   file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   begin.resize(static_cast<std::size_t>(file.gcount()));
-  begin.erase(0, begin.find_first_not_of(" \t\r\n"));
   const bool ours =
       begin.empty() || std::any_of(beginnings.begin(), beginnings.end(),
                                    [&](const std::string& b) { return begin.rfind(b, 0) == 0; });
