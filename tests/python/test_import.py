@@ -185,6 +185,74 @@ def test_binary_tables_become_csv(tmp_path):
     assert "is none of .mat" in table("a.xlsx", 2).stderr
 
 
+BALL = {"wheels": ["e0", "e1", "e2"], "drive": ["d0", "d1", "d2"], "gyro": ["gx", "gy", "gz"]}
+BALL |= {"accel": ["ax", "ay", "az"]}
+
+
+@pytest.fixture(scope="module")
+def ball_table(root, tmp_path_factory):
+    """20 s of the simulated MBBR, driving and pushed along both axes."""
+    folder = tmp_path_factory.mktemp("ball")
+    log = folder / "sim.lcm"
+    pushes = ", ".join(
+        f"{{at_s={t}, duration_s=0.05, force_N=[{float(t % 4 == 1)}, {float(t % 4 == 3)}]}}"
+        for t in range(3, 18, 2)
+    )
+    run("sim", "--config", root / "config/mbbr.toml", "--fidelity", "nominal", "--duration-s", 20,
+        "--yaw-hz", 0.3, "--drive-mps", 0.1, "--telemetry", "off", "--log", log,
+        "--set", f"world.nominal.pushes=[{pushes}]")  # fmt: skip
+    run("convert", log, "--to", "csv")
+    ours = pd.read_csv(log.with_suffix(".csv"))
+    out = ours[list(SAMPLES)].rename(columns=SAMPLES)
+    out[["gx", "gy", "gz"]] /= 16.4
+    out[["ax", "ay", "az"]] /= 4096
+    out.insert(0, "t", ours["t_s"])
+    for i in range(3):
+        out[f"e{i}"] = ours[f"sensors.encoder_counts_{i}"] * 2 * np.pi / 720
+        out[f"d{i}"] = ours[f"motors.duty_{i}"]
+    out["v"] = ours["health.battery_V"]
+    out.to_csv(folder / "theirs.csv", index=False)
+    return folder / "theirs.csv"
+
+
+@pytest.mark.parametrize(
+    ("columns", "azimuth", "check", "named"),
+    [
+        ({}, -140, None, ""),
+        (
+            {"wheels": ["e1", "e0", "e2"]},
+            -140,
+            "wheel_order",
+            "columns are wheels 2, 1, 3 of the configuration",
+        ),
+        (
+            {"wheels": ["e1", "e2", "e0"]},
+            -140,
+            "wheel_order",
+            "2, 3, 1 of the configuration, or robot.wheel_azimuth",
+        ),
+        ({"wheels": ["e0", "-e1", "e2"]}, -140, "wheel_order", "the sign of column 2 is flipped"),
+        ({}, -100, "wheel_order", "robot.wheel_azimuth_deg is off: add -4"),
+        ({}, 40, "wheel_order", "robot.wheel_azimuth_deg is off: add 17"),
+        ({"gyro": ["gx", "gy", "-gz"]}, -140, "wheel_order", "gyro z is flipped"),
+        ({"drive": ["d1", "d0", "d2"]}, -140, "drive_wheels_y", "the sign of drive or wheels is flipped"),
+    ],
+)
+def test_wheel_order_and_azimuth_of_a_ball_bot_are_named(
+    root, ball_table, tmp_path, columns, azimuth, check, named
+):
+    config = tmp_path / "ball.toml"
+    text = (root / "config/mbbr.toml").read_text()
+    config.write_text(text.replace("wheel_azimuth_deg = -140.0", f"wheel_azimuth_deg = {azimuth}"))
+    out = checks(ball_table, write_map(tmp_path / "map.toml", config, columns=BALL | columns))
+    if check is None:
+        assert out["checks_failed"] == [] and out["by_name"]["wheel_order"]["ok"]
+        assert out["by_name"]["drive_wheels"]["ok"] and out["by_name"]["drive_wheels_y"]["ok"]
+    else:
+        assert check in out["checks_failed"]
+        assert named in out["by_name"][check]["text"]
+
+
 # Real logs: of the folder beside the project, where there is one.
 REAL = {
     "mini_segway_log278": "pichim+Mini_Segway/docs/matlab/LOG278.TXT",

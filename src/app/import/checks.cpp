@@ -7,130 +7,19 @@
 
 #include "app/import/regression.hpp"
 #include "app/import/signals.hpp"
+#include "app/import/table_checks.hpp"
+#include "app/import/wheel_order.hpp"
 #include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
 
-constexpr double kRight = 1.4;         // so far off may be a radius, a track, an accelerometer's scale
 constexpr double kRightOfForce = 5.0;  // what the specific force says of small motions, shaken as it is
-constexpr double kNearUnit = 0.2;      // as close to a factor of units is a mistake of units
-
-double median(Series values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-/// Which mistake of units makes a factor of `scale`; empty: none that is known.
-std::string units_mistake(double scale, const std::vector<std::pair<double, const char*>>& known) {
-  for (const auto& [factor, what] : known)
-    if (std::abs(std::log(std::abs(scale) / factor)) < kNearUnit) return what;
-  return "";
-}
-
-bool right(double scale, double factor = kRight) { return scale > 1.0 / factor && scale < factor; }
-
-// ---- the table itself
-
-Check check_rows(const Table& table) {
-  const std::size_t torn = table.torn_rows;
-  return {"rows", torn * 100 <= table.rows(), static_cast<double>(torn),
-          format("%zu rows; %zu with another number of cells are left out", table.rows(), torn)};
-}
-
-Series steps(const Series& t_s) {
-  Series dt;
-  for (std::size_t k = 1; k < t_s.size(); ++k) dt.push_back(t_s[k] - t_s[k - 1]);
-  return dt;
-}
-
-Check check_clock(const ImportedRows& rows) {
-  const Series dt = steps(rows.t_s);
-  const double usual = median(dt);
-  const double late = *std::max_element(dt.begin(), dt.end());
-  Check c{"clock", std::nullopt, 1.0 / usual,
-          format("%.1f rows a second, longest step %.1f ms", 1.0 / usual, 1e3 * late)};
-  c.ok = rows.not_advancing == 0 && usual > 1e-5 && usual < 0.1;
-  if (rows.not_advancing > 0)
-    c.text += format("; %zu rows whose time does not advance are left out", rows.not_advancing);
-  if (usual >= 0.1) c.text += "; too slow for balancing: is time.unit ms or us?";
-  if (usual <= 1e-5) c.text += "; too fast for a control loop: is time.unit s or ms?";
-  return c;
-}
-
-Check check_gaps(const ImportedRows& rows) {
-  const Series dt = steps(rows.t_s);
-  const double usual = median(dt);
-  const auto gaps =
-      std::count_if(dt.begin(), dt.end(), [&](double d) { return d > 2.5 * usual && d > kTickS; });
-  return {"gaps", gaps == 0, static_cast<double>(gaps), format("%td gaps of more than two rows", gaps)};
-}
-
-Check check_repeats(const ImportedRows& rows) {
-  std::size_t same = 0;
-  for (std::size_t k = 1; k < rows.t_s.size(); ++k)
-    same += rows.gyro_rad_s[k] == rows.gyro_rad_s[k - 1] && rows.accel_m_s2[k] == rows.accel_m_s2[k - 1];
-  const double share = static_cast<double>(same) / static_cast<double>(rows.t_s.size() - 1);
-  return {"repeats", share < 0.01, share,
-          format("%.1f %% of the IMU's samples repeat the one before", 100.0 * share)};
-}
-
-/// At the stated range; without one, an extreme that is taken more often than noise would.
-Check check_clipping(const char* name, const std::vector<Vec3>& values, double range) {
-  std::size_t clipped = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    double limit = 0.0;
-    for (const Vec3& v : values) limit = std::max(limit, std::abs(v(axis)));
-    std::size_t at = 0;
-    for (const Vec3& v : values)
-      at += std::abs(v(axis)) >= (range > 0.0 ? 0.999 * range : limit) && limit > 0.0;
-    if (range > 0.0 || at >= 5) clipped += at;
-  }
-  const double share = static_cast<double>(clipped) / static_cast<double>(values.size());
-  return {name, share < 1e-3, share,
-          format("%.2f %% of the samples are at the end of the range", 100.0 * share)};
-}
-
-/// Angles that no motor without load could turn in a row's time.
-Check check_jumps(const ImportedRows& rows, const ImportedRobot& robot) {
-  const double fastest = 1.5 * robot.motor.no_load_rad_s(robot.motor.nominal_V);
-  const double count = 2.0 * kPi / robot.calibration.encoder_counts_per_rev;
-  std::size_t jumps = 0;
-  double largest = 0.0;
-  for (std::size_t k = 1; k < rows.t_s.size(); ++k) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(robot.wheels); ++i) {
-      const double step = std::abs(rows.wheel_rad[k][i] - rows.wheel_rad[k - 1][i]);
-      if (!(step > fastest * (rows.t_s[k] - rows.t_s[k - 1]) + 2.0 * count)) continue;
-      ++jumps;
-      largest = std::max(largest, step);
-    }
-  }
-  const bool units = jumps > rows.t_s.size() / 10;
-  return {"wheel_jumps", jumps == 0, static_cast<double>(jumps),
-          format("%zu steps beyond 1.5 times the no-load speed of %.0f rad/s%s", jumps, fastest / 1.5,
-                 units ? ": is wheels.unit right?" : "")};
-}
-
-Check check_norm(const ImportedRows& rows) {
-  Series norms;
-  for (const Vec3& f : rows.accel_m_s2)
-    if (f.allFinite()) norms.push_back(f.norm());
-  const double share = norms.empty() ? kNotGiven : median(norms) / kGravity_m_s2;
-  Check c{"accel_norm", right(share), share, format("median %.3f g", share)};
-  const std::string mistake = units_mistake(share, {{1.0 / kGravity_m_s2, ": accel.unit is g, not m/s2"},
-                                                    {kGravity_m_s2, ": accel.unit is m/s2, not g"},
-                                                    {1e-3, ": accel.unit is mg, not g"},
-                                                    {1e3, ": accel.unit is g, not mg"}});
-  c.text += !mistake.empty() ? mistake : *c.ok ? "" : ": accel.scale or a channel is wrong";
-  return c;
-}
-
-// ---- sensors against each other, every tick
 
 /// The rows on a grid of ticks, between them by a line.
 struct Grid {
   Series gyro[3], accel[3], roll[2], drive_roll[2], yaw, wheel_half_difference, drive_half_difference;
+  Series wheel[kMaxMotors];
   std::vector<bool> used;
 
   Grid(const ImportedRows& rows, const ImportMap& map, const ImportedRobot& robot) {
@@ -152,6 +41,7 @@ struct Grid {
       for (std::size_t i = 0; i < w.size(); ++i) {
         w[i] = between(rows.wheel_rad[k][i], rows.wheel_rad[k + 1][i]);
         u[i] = between(rows.drive[k][i], rows.drive[k + 1][i]);
+        wheel[i].push_back(w[i]);
       }
       const std::array<double, 3> axes = robot.input(u);
       for (std::size_t i = 0; i < 2; ++i) {
@@ -187,18 +77,25 @@ struct Grid {
   }
 };
 
-/// What the specific force says of the gyro (its first coefficient) and of the wheels: seen from the body,
-/// gravity turns against the gyro, and the axis of rolling accelerates as the wheels do.
+/// Seen from the body, gravity turns against the gyro, and the axis of rolling accelerates as the wheels do:
+/// `felt` = sign (gyro_part - r x rolling acceleration against the body).
+struct Force {
+  double sign, r;
+  Series felt, gyro_part;
+  Force(const Grid& g, const ImportedRobot& robot, int axis)
+      : sign(axis == 0 ? 1.0 : -1.0),
+        r(robot.rolling_radius_m),
+        felt(combine(g.accel[1 - axis], sign, integral(product(g.gyro[2], g.accel[axis])))),
+        gyro_part(combine(scaled(kGravity_m_s2, integral(g.gyro[axis])), -(r + robot.imu_height_m),
+                          derivative(g.gyro[axis]))) {}
+  Series rolling_acceleration() const { return scaled(1.0 / r, combine(gyro_part, -sign, felt)); }
+};
+
+/// What the specific force says of the gyro (its first coefficient) and of the wheels.
 std::vector<Coefficient> against_accel(const Grid& g, const ImportedRobot& robot, int axis) {
-  const int across = 1 - axis;  // of the accelerometer
-  const double sign = axis == 0 ? 1.0 : -1.0;
-  const double r = robot.rolling_radius_m;
-  const Series rate = g.gyro[axis];
-  const Series felt = combine(g.accel[across], sign, integral(product(g.gyro[2], g.accel[axis])));
-  const Series gyro = combine(scaled(sign * kGravity_m_s2, integral(rate)), -sign * (r + robot.imu_height_m),
-                              derivative(rate));
-  const Series wheels = scaled(-sign * r, derivative(derivative(g.roll[axis])));
-  return g.fit({gyro, wheels}, felt);
+  const Force f(g, robot, axis);
+  const Series wheels = scaled(-f.sign * f.r, derivative(derivative(g.roll[axis])));
+  return g.fit({scaled(f.sign, f.gyro_part), wheels}, f.felt);
 }
 
 std::string shown(const Coefficient& c) {
@@ -253,19 +150,22 @@ void check_tilt(const Grid& g, const ImportedRobot& robot, std::vector<Check>* c
   }
 }
 
-/// Rate against voltage, in units of the no-load speed.
+/// Rate against voltage, in units of the no-load speed; `gear`: wheel rates per rate, and drive per wheel's
+/// drive.
 Coefficient rate_per_drive(const Grid& g, const ImportedRobot& robot, const Series& angle,
-                           const Series& drive) {
+                           const Series& drive, double gear = 1.0) {
   Coefficient c = g.fit({drive}, derivative(angle)).front();
   constexpr double kLeast = 1e-3;  // of the nominal voltage; less does not move a wheel
   if (std::sqrt(mean_square(g.part(drive))) < kLeast) return {0.0, INFINITY};
-  const double no_load = robot.motor.no_load_rad_s(robot.motor.nominal_V);
+  const double no_load = robot.motor.no_load_rad_s(robot.motor.nominal_V) / (gear * gear);
   return {c.value / no_load, c.sigma / no_load};
 }
 
 void check_drive(const Grid& g, const ImportedRobot& robot, std::vector<Check>* checks) {
+  const std::array<double, 3> axis_of_first = robot.input({1.0});
+  const double gear = robot.yaw ? 1.0 : Vec3(axis_of_first.data()).norm();  // ball over wheel radius
   for (int axis = 0; axis < (robot.yaw ? 1 : 2); ++axis) {
-    const Coefficient c = rate_per_drive(g, robot, g.roll[axis], g.drive_roll[axis]);
+    const Coefficient c = rate_per_drive(g, robot, g.roll[axis], g.drive_roll[axis], gear);
     Check check{axis == 0 ? "drive_wheels" : "drive_wheels_y", std::nullopt, c.value,
                 "wheel rate per drive, of the no-load speed: " + shown(c)};
     if (c.known()) check.ok = c.value > 0.02 && c.value < 3.0;
@@ -300,6 +200,37 @@ void check_yaw(const Grid& g, const ImportedRobot& robot, std::vector<Check>* ch
   checks->push_back(check);
 }
 
+/// A ball-bot's wheels: where each one's axis is, by what the IMU says of the ball's motion against the body.
+void check_order(const Grid& g, const ImportedRobot& robot, std::vector<Check>* checks) {
+  if (robot.yaw) return;
+  const std::vector<Series> ball{Force(g, robot, 0).rolling_acceleration(),
+                                 Force(g, robot, 1).rolling_acceleration(),
+                                 scaled(-1.0, derivative(g.gyro[2]))};
+  Mat3 configured;
+  Mat3 measured;
+  bool known = true;
+  for (int i = 0; i < 3; ++i) {
+    WheelValues one{};
+    one[static_cast<std::size_t>(i)] = 1.0;
+    configured.col(i) = Eigen::Map<const Vec3>(robot.input(one).data());
+    const std::vector<Coefficient> c = g.fit(ball, derivative(derivative(g.wheel[i])));
+    const double sigma = std::hypot(c[0].sigma, c[1].sigma);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      measured(static_cast<int>(axis), i) = axis < 2 || c[axis].known() ? c[axis].value : 0.0;
+    known = known && measured.col(i).head<2>().norm() > 3.0 * sigma;
+  }
+  Check check{"wheel_order", std::nullopt, kNotGiven, "wheel axes against the IMU"};
+  if (known) {
+    const WheelOrder order = wheel_order(configured, measured);
+    check.value = order.azimuth_rad;
+    check.text += format(", %+.0f degrees about z", order.azimuth_rad * 180.0 / kPi) + order.mistake;
+    check.ok = order.mistake.empty();
+  } else {
+    check.text += ": this log does not tell";
+  }
+  checks->push_back(check);
+}
+
 /// A balancing robot's z points up.
 Check check_up(const Grid& g, const ImportMap& map) {
   Series up;
@@ -319,18 +250,12 @@ Check check_up(const Grid& g, const ImportMap& map) {
 
 std::vector<Check> check_import(const Table& table, const ImportedRows& rows, const ImportMap& map,
                                 const ImportedRobot& robot) {
-  std::vector<Check> checks{check_rows(table),
-                            check_clock(rows),
-                            check_gaps(rows),
-                            check_repeats(rows),
-                            check_clipping("gyro_clipping", rows.gyro_rad_s, map.gyro.range),
-                            check_clipping("accel_clipping", rows.accel_m_s2, map.accel.range),
-                            check_jumps(rows, robot),
-                            check_norm(rows)};
+  std::vector<Check> checks = check_table(table, rows, map, robot);
   if (rows.t_s.back() - rows.t_s.front() < 1.0) return checks;  // too short to move
   const Grid grid(rows, map, robot);
   checks.push_back(check_up(grid, map));
   if (std::count(grid.used.begin(), grid.used.end(), true) < 100) return checks;
+  check_order(grid, robot, &checks);
   check_tilt(grid, robot, &checks);
   check_drive(grid, robot, &checks);
   check_yaw(grid, robot, &checks);
