@@ -48,6 +48,7 @@ class Section {
 
   Section table(const std::string& key);
   bool has(const std::string& key) const { return table_.contains(key); }
+  bool is_text(const std::string& key) const { return table_[key].is_string(); }
   /// Array of tables.
   std::vector<Section> tables(const std::string& key, std::size_t min, std::size_t max);
 

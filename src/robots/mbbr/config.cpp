@@ -35,7 +35,9 @@ MbbrParameters read_robot(Section s) {
   p.l_a = s.vector<3>("imu_position_m", -1.0, 1.0);
   p.alpha_deg = s.number("wheel_latitude_deg", 35.3, 89.0);
   p.azimuth_deg = s.number("wheel_azimuth_deg", -180.0, 180.0);
-  if (s.has("wheel_tilt_deg")) {
+  if (s.is_text("wheel_tilt_deg")) {
+    s.choice("wheel_tilt_deg", {"orthogonal"});
+  } else if (s.has("wheel_tilt_deg")) {
     p.wheel_tilt_deg = s.number("wheel_tilt_deg", -90.0, 90.0);
     constexpr double kLeast = 0.05;  // volume of the axes; 1: orthogonal
     if (std::abs(p.wheel_axes().determinant()) < kLeast)
