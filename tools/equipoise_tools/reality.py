@@ -47,6 +47,14 @@ def measured(root: Path, table: Path, map_file: Path) -> dict[str, Any]:
         return {"checks_failed": checks["checks_failed"], **run("replay", log, "--shadow")}
 
 
+def identified(table: Path, map_file: Path) -> dict[str, Any]:
+    """Of a log without raw gyro."""
+    command = [sys.executable, "-m", "equipoise_tools.identify_balancing", str(table), "--map", str(map_file)]
+    done = subprocess.run([*command, "--json"], stdout=subprocess.PIPE, check=True)
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
 def shown(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
     return "-" if value is None else f"{scale * value:.{digits}f}"
 
@@ -103,6 +111,19 @@ def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
             + " |"
         )
         noise_rows.append(f"| {name} | {noise(s, 'gyro')} | {noise(s, 'accel')} |")
+    known_rows = [
+        "| log | fitted | rest: configured | identified | persistence | constant rate |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, s in data.get("identified", {}).items():
+        fitted = ", ".join(
+            f"{n} {e['value']:.3g} +- {e['half_width_95']:.2g}" for n, e in s["estimates"].items()
+        )
+        identified_ahead = s["ahead_identified"]
+        errors = [s["ahead_configured"]["model"], identified_ahead["model"]]
+        errors += [identified_ahead["persistence"], identified_ahead["constant_rate"]]
+        cells = " | ".join(f"{shown(e['tilt'], 1e3, 1)}, {shown(e['wheel'], 1e3, 1)}" for e in errors)
+        known_rows.append(f"| {name} | {fitted} | {cells} |")
     for name, content in maps.items():
         source = content["source"]
         origin.append(
@@ -117,6 +138,8 @@ def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
             *ahead_rows,
             "\nNoise of the samples while balancing (second differences, as white noise).\n",
             *noise_rows,
+            "\n`tools/lab identify`, SI, first half fitted; 0.1 s ahead in the rest: tilt, wheels, mrad.\n",
+            *known_rows,
             "\n## Origin\n",
             *origin,
             "",
@@ -146,14 +169,18 @@ def main() -> int:
             print(f"{file.stem}: not in {arguments.folder}", file=sys.stderr)
             continue
         print(f"{file.stem} ...", file=sys.stderr)
-        done[file.stem] = measured(root, table, file)
-    if not done:
+        if "gyro" in maps[file.stem]:
+            done[file.stem] = measured(root, table, file)
+        else:
+            known = identified(table, file)
+            data.setdefault("identified", {})[file.stem] = known | {"log": table.name}
+    if not done and not data.get("identified"):
         print(f"{arguments.folder}: holds none of the logs of docs/reality.md", file=sys.stderr)
         return 1
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], cwd=root, capture_output=True, text=True, check=False
     )
-    data["version"] = commit.stdout.strip() or next(iter(done.values()))["version"]
+    data["version"] = commit.stdout.strip() or "-"
     data["now"] |= done
     if arguments.before:
         data["before"], data["before_version"] = dict(data["now"]), data["version"]
