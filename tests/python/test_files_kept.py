@@ -45,13 +45,12 @@ def test_a_log_is_not_converted_onto_itself(do, log, tmp_path):
     assert log.read_bytes() == before and (tmp_path / "y.csv").read_bytes() == before
 
 
-def test_a_result_replaces_only_its_own_kind(do, log, root, tmp_path):
+def test_a_result_replaces_only_its_own_kind(do, log, tmp_path):
     notes = tmp_path / "notes.md"
     notes.write_text("A winter's work\n")
     for kind, command in {
         "csv": ["convert", "x.lcm", "--to", "csv", "--out"],
         "mcap": ["convert", "x.lcm", "--to", "mcap", "--out"],
-        "summary of a campaign": ["campaign", "--config", root / "config/edumip.toml", "--markdown"],
         "buttons of an app": ["remote", "learn", "--port", "/dev/null", "--out"],
     }.items():
         assert f"notes.md: exists and holds no {kind}" in do(*command, "notes.md", status=2)

@@ -1,6 +1,7 @@
 """What the reliability page makes of a campaign's cases."""
 
 from equipoise_tools.reliability import traced
+from equipoise_tools.reliability_faults import table
 from equipoise_tools.reliability_population import POPULATION_FAULTS, found
 
 
@@ -31,3 +32,21 @@ def test_a_traced_tick_counts_when_its_test_passed(root):
         assert not traced(console.format(case).replace("0 sleeps", "1 sleeps"))[3]
         assert not traced(console.format(case).replace("      OK", "  FAILED"))[3]
     assert not traced("")[3]
+
+
+def test_a_table_of_faults_has_a_row_for_each_and_names_what_is_unsafe():
+    def outcome(fault, phase, **other):
+        told = {"unsafe": False, "upright": False, "disarmed": False, "reasons": "not_requested", "why": ""}
+        return {"fault": fault, "phase": phase, "off_after_ticks": None, **told, **other}
+
+    cases = [
+        outcome("imu_off", "disarmed"),
+        outcome("imu_off", "driving", disarmed=True, off_after_ticks=31, reasons="imu_stale"),
+        outcome("nack", "disarmed", unsafe=True, why="motors on unasked"),
+        outcome("nack", "driving", upright=True),
+    ]
+    assert table({"cases": cases, "faults": {"imu_off": "no sample", "nack": "a NACK"}}) == (
+        "| fault | disarmed | driving |\n|---|---|---|\n"
+        "| imu_off: no sample | stays off: not_requested | off by tick 31: imu_stale |\n"
+        "| nack: a NACK | **UNSAFE: motors on unasked** | stays up |\n"
+    )

@@ -14,41 +14,16 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
-from pathlib import Path
 
 from .entry import leave
-from .reliability_part import BINARY, BUILD, CONFIGS, ROOT, Part, isolated, output
+from .reliability_faults import faults
+from .reliability_part import BINARY, BUILD, ROOT, Part, isolated, output
 from .reliability_population import population
 
 PAGE = ROOT / "docs" / "reports" / "reliability.md"
 GUARD_LIMIT_MS = 15.0
 WAKE_RATIO_LIMIT = 1.1
 FUZZ_EXECUTIONS = 10_000_000
-
-
-def faults(options: argparse.Namespace) -> Part:
-    part = Part()
-    for robot, config in CONFIGS.items():
-        with tempfile.TemporaryDirectory() as folder:
-            table = Path(folder) / "table.md"
-            told = json.loads(
-                output(
-                    *(BINARY, "campaign", "--config", config, "--soak-hours", options.soak_hours),
-                    *("--markdown", table, "--json", "-"),
-                    check=False,
-                )
-            )
-            part.section += table.read_text() + "\n"
-        soak = told["soak"]
-        cases, unsafe = told["case_count"], told["unsafe"]
-        holds = cases >= 60 and unsafe == 0
-        part.rows.append(
-            (f"{robot}: fault × phase", "60 cases, 0 unsafe", f"{cases} cases, {unsafe} unsafe", holds)
-        )
-        ended = f"{soak['hours']:.1f} h, {soak['unsafe']} unsafe, {soak['unexplained']} without a cause"
-        holds = soak["hours"] >= 10 and soak["unsafe"] == soak["unexplained"] == 0
-        part.rows.append((f"{robot}: soak", "10 h, no fall that its fault does not explain", ended, holds))
-    return part
 
 
 def runtime_tests(filter_: str) -> str:

@@ -131,6 +131,17 @@ class PackedFilter {
     normalized_innovation_ = used > 0 ? nis / used : 0.0;
   }
 
+  /// The same of a P that was widened since: the correction changes, the rows' innovations stay as told.
+  void weigh_again(const Vec<p>& u, const Vec<m>& y, const std::array<bool, m>& use) noexcept {
+    const std::array<double, m> nis = row_nis_;
+    const std::array<double, m> innovation = row_innovation_;
+    const std::array<double, m> variance = row_variance_;
+    innovate(u, y, use);
+    row_nis_ = nis;
+    row_innovation_ = innovation;
+    row_variance_ = variance;
+  }
+
   /// Of a tick without samples there is nothing to correct.
   void miss() noexcept {
     row_nis_.fill(0.0);
@@ -154,6 +165,17 @@ class PackedFilter {
     on_core(core_, [&](auto& core) {
       for (int i = first; i < first + count; ++i)
         core.P[place(i, i)] += static_cast<RealOf<decltype(core)>>(variance);
+    });
+  }
+
+  /// Adds the covariance `variance` d d' of the states from `first` on.
+  template <int count>
+  void widen(int first, const Vec<count>& d, double variance) noexcept {
+    on_core(core_, [&](auto& core) {
+      for (int i = 0; i < count; ++i) {
+        for (int j = i; j < count; ++j)
+          core.P[place(first + i, first + j)] += static_cast<RealOf<decltype(core)>>(variance * d(i) * d(j));
+      }
     });
   }
 

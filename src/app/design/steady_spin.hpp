@@ -71,7 +71,7 @@ class SettledControllerOf : public SettledController {
                       double yaw_rate_rad_s)
       : robot_(config.robot),
         kinematics_(config.robot),
-        estimators_(config.estimators),
+        estimators_(in_double(config.estimators)),
         reference_(config.reference),
         feedback_(feedback),
         yaw_step_(Spin::yaw_acceleration_rad_s2(config.reference) * kTickS) {
@@ -98,6 +98,13 @@ class SettledControllerOf : public SettledController {
  private:
   using Robot = typename Spin::Robot;
   using Input = Vec<Robot::kInputs>;
+  using Estimators = typename Spin::Estimators;
+
+  /// Single precision would drown a small impulse's answer in the last digit of what it settled at.
+  static typename Estimators::Params in_double(typename Estimators::Params params) {
+    params.ekf.precision = Precision::kDouble;
+    return params;
+  }
 
   typename Robot::Sample sample(const Readings& readings) {
     typename Robot::Sample z = Spin::sample(robot_, kinematics_, readings, yaw_rate_, heading_);
@@ -109,7 +116,7 @@ class SettledControllerOf : public SettledController {
   typename Robot::Parameters robot_;
   typename Robot::Kinematics kinematics_;
   RotorSpeed<Robot::kWheels> rotor_speed_;
-  typename Spin::Estimators estimators_;
+  Estimators estimators_;
   typename Spin::Reference reference_;
   Feedback feedback_;
   double yaw_step_;

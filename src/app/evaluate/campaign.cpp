@@ -1,17 +1,13 @@
-// `equipoise campaign`: every fault in every phase of a run, and the soak; docs/reports/reliability.md from
-// it.
+// `equipoise campaign`: every fault in every phase of a run, and the soak.
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
-#include <map>
 #include <memory>
 #include <random>
-#include <utility>
 
 #include "app/cli/commands.hpp"
 #include "app/evaluate/fault_run.hpp"
 #include "app/evaluate/parallel.hpp"
-#include "app/text/files.hpp"
+#include "app/text/format.hpp"
 #include "app/text/json.hpp"
 #include "app/text/reasons.hpp"
 #include "app/trial/firmware.hpp"
@@ -23,7 +19,6 @@ namespace {
 struct CampaignArguments {
   std::string config;
   std::string json;
-  std::string markdown;
   std::string fidelity = "nominal";
   std::string controller;  // empty: the robot's default
   std::vector<std::string> set;
@@ -40,10 +35,10 @@ struct CampaignArguments {
 
 struct Soak {
   double hours = 0.0;
-  std::int64_t runs = 0;
-  std::int64_t disarmed = 0;
-  std::int64_t unexplained = 0;
-  std::int64_t unsafe = 0;
+  int runs = 0;
+  int disarmed = 0;
+  int unexplained = 0;
+  int unsafe = 0;
   nlohmann::json to_explain = nlohmann::json::array();  // runs that are unsafe or ended without a fault
 };
 
@@ -151,36 +146,7 @@ nlohmann::json row_of(const Case& c, const FaultOutcome& v) {
           {"reasons", reasons_text(v.reasons)}};
 }
 
-/// What one cell of the table says of its cases.
-std::string cell_of(const std::vector<FaultOutcome>& outcomes) {
-  int upright = 0;
-  int off = 0;
-  int unsafe = 0;
-  int latest = 0;
-  std::uint32_t reasons = 0;
-  const char* why = "";
-  for (const FaultOutcome& v : outcomes) {
-    upright += v.upright ? 1 : 0;
-    off += v.disarmed ? 1 : 0;
-    unsafe += v.unsafe ? 1 : 0;
-    latest = std::max(latest, v.disarmed ? v.off_after_ticks : 0);
-    reasons |= v.reasons;
-    if (v.unsafe) why = v.why;
-  }
-  const std::string n = outcomes.size() == 1 ? "" : "/" + std::to_string(outcomes.size());
-  if (unsafe > 0) return "**UNSAFE " + std::to_string(unsafe) + n + ": " + why + "**";
-  std::string cell;
-  if (upright > 0) cell = n.empty() ? "stays up" : std::to_string(upright) + n + " stay up";
-  if (off > 0) {
-    if (!cell.empty()) cell += "; ";
-    cell += (n.empty() ? "" : std::to_string(off) + n + " ") + "off by tick " + std::to_string(latest) +
-            ": " + reasons_text(reasons);
-  }
-  return cell.empty() ? "stays off: " + reasons_text(reasons) : cell;
-}
-
 int campaign(const CampaignArguments& a) {
-  if (!a.markdown.empty()) check_output(a.markdown, {"## "}, "summary of a campaign");
   const RobotType& type = robot_type_of(robot_type(a.config), a.config);
   Choice choice;
   choice.controller = a.controller;
@@ -201,34 +167,14 @@ int campaign(const CampaignArguments& a) {
 
   nlohmann::json cases = nlohmann::json::array();
   int unsafe = 0;
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<FaultOutcome>> cells;
   for (std::size_t i = 0; i < all.size(); ++i) {
     cases.push_back(row_of(all[i], outcomes[i]));
     unsafe += outcomes[i].unsafe ? 1 : 0;
-    cells[{static_cast<std::size_t>(all[i].plan.fault), static_cast<std::size_t>(all[i].plan.phase)}]
-        .push_back(outcomes[i]);
-  }
-  std::string table = "| fault | ";
-  std::string rule = "|---|";
-  for (const char* phase : kPhaseNames) {
-    if (!chosen(a.phases, phase)) continue;
-    table += std::string(phase) + " | ";
-    rule += "---|";
-  }
-  table += "\n" + rule + "\n";
-  for (std::size_t f = 0; f < kFaults.size(); ++f) {
-    if (!chosen(a.faults, kFaults[f].name)) continue;
-    table += "| " + std::string(kFaults[f].name) + ": " + kFaults[f].why + " | ";
-    for (std::size_t p = 0; p < kPhaseNames.size(); ++p) {
-      if (chosen(a.phases, kPhaseNames[p])) table += cell_of(cells[{f, p}]) + " | ";
-    }
-    table += "\n";
   }
   nlohmann::json out{
       {"robot", type.name}, {"cases", cases}, {"case_count", cases.size()}, {"unsafe", unsafe}};
-  std::string summary =
-      std::to_string(cases.size()) + " fault x phase cases, " + std::to_string(unsafe) + " unsafe";
-  std::string soak_runs;
+  for (const FaultInfo& fault : kFaults) out["faults"][fault.name] = fault.why;
+  std::string summary = format("%zu fault x phase cases, %d unsafe", cases.size(), unsafe);
   if (a.soak_h > 0.0) {
     const Soak s = soak(*robots[0], choice, a.soak_h, a.seed);
     out["soak"] = {{"hours", s.hours},
@@ -237,20 +183,10 @@ int campaign(const CampaignArguments& a) {
                    {"unsafe", s.unsafe},
                    {"unexplained", s.unexplained},
                    {"to_explain", s.to_explain}};
-    char line[200];
-    std::snprintf(line, sizeof line,
-                  "; soak %.2f h of robot time, %lld runs, %lld disarmed by a fault, %lld unsafe, "
-                  "%lld without a cause",
-                  s.hours, static_cast<long long>(s.runs), static_cast<long long>(s.disarmed - s.unexplained),
-                  static_cast<long long>(s.unsafe), static_cast<long long>(s.unexplained));
-    summary += line;
-    unsafe += static_cast<int>(s.unsafe + s.unexplained);
-    for (const nlohmann::json& run : s.to_explain) soak_runs += "- " + run.dump() + "\n";
-  }
-  if (!a.markdown.empty()) {
-    std::ofstream file(a.markdown);
-    file << "## " << type.name << "\n" << summary << ".\n" << soak_runs << "\n" << table;
-    if (!file.flush()) throw InputError(a.markdown + ": cannot be written");
+    summary +=
+        format("; soak %.2f h of robot time, %d runs, %d disarmed by a fault, %d unsafe, %d without a cause",
+               s.hours, s.runs, s.disarmed - s.unexplained, s.unsafe, s.unexplained);
+    unsafe += s.unsafe + s.unexplained;
   }
   std::fprintf(a.json == "-" ? stderr : stdout, "%s: %s\n", type.name, summary.c_str());
   if (!a.json.empty()) write_json(out, a.json);
@@ -287,7 +223,6 @@ void add_campaign(Subcommand app) {
   command.option("--soak-hours", a->soak_h, "then random runs, hours of robot time")
       .show_default()
       .range(0.0, 10000.0);
-  command.option("--markdown", a->markdown, "table for docs/reports/reliability.md").file();
   command.option("--json", a->json, "cases as JSON, - for stdout").file();
   command.action([=] { return campaign(*a); });
 }

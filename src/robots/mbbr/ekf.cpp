@@ -1,5 +1,6 @@
 #include "robots/mbbr/ekf.hpp"
 
+#include "equipoise/estimate/encoder_slip.hpp"
 #include "equipoise/estimate/heun.hpp"
 
 namespace equipoise {
@@ -201,8 +202,12 @@ void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
   y.segment<2>(Model::kAccel) = z.accel_B_m_s2.head<2>();
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
-  filter_.innovate(time_.acted(), y,
-                   {imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], wheel[2], imu, imu});
+  const std::array<bool, 8> use{
+      imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], wheel[2], imu, imu};
+  filter_.innovate(time_.acted(), y, use);
+  const auto counts = [this](const Vec3& wheels) { return kinematics_.ball_from_wheels(wheels); };
+  if (encoders_slip_ && widen_by_slip<3>(filter_, Model::kWheel, Model::kE, counts))
+    filter_.weigh_again(time_.acted(), y, use);
 }
 
 Vec3 MbbrEkf::wheel_rate_rad_s() const noexcept {

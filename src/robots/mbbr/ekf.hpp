@@ -103,6 +103,8 @@ class MbbrEkf {
   MbbrEstimate estimate() const noexcept;
   Vec3 wheel_rate_rad_s() const noexcept;
 
+  /// A wheel's encoder may turn alone: encoder_slip.hpp. Its faults then leave no trace but innovations.
+  void let_encoders_slip(bool slip) noexcept { encoders_slip_ = slip; }
   /// The gyro's bias is known to so much less.
   void doubt_bias(double sigma_rad_s) noexcept { filter_.widen(Model::kBiasX, 2, sigma_rad_s * sigma_rad_s); }
 
@@ -125,6 +127,7 @@ class MbbrEkf {
   MbbrKinematics kinematics_;
   Filter filter_;
   TimeBase<3, 3> time_;
+  bool encoders_slip_ = false;
   double gyro_bias_z_ = 0.0;
   double heading_ = 0.0;
   Turn direction_{0.0};  // of it

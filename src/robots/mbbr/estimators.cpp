@@ -64,7 +64,9 @@ MbbrEstimators::MbbrEstimators(const Params& params)
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()
                               : MbbrLinearModel(params.robot, params.kf_yaw_transport),
-          params.kf) {}
+          params.kf) {
+  ekf_.let_encoders_slip(!params.detection);  // else the detectors judge what an encoder does to the filter
+}
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);

@@ -1,5 +1,6 @@
 #include "robots/mip/ekf.hpp"
 
+#include "equipoise/estimate/encoder_slip.hpp"
 #include "equipoise/estimate/heun.hpp"
 
 namespace equipoise {
@@ -247,9 +248,14 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
   judge_y();
-  filter_.innovate(
-      time_.acted(), y,
-      {imu && axis[0], imu && axis[1] && without_y_ == 0, imu && axis[2], wheel[0], wheel[1], imu});
+  const std::array<bool, 6> use{
+      imu && axis[0], imu && axis[1] && without_y_ == 0, imu && axis[2], wheel[0], wheel[1], imu};
+  filter_.innovate(time_.acted(), y, use);
+  const auto counts = [this](const Vec2& wheels) {
+    return Vec2(kinematics_.phi(wheels), kinematics_.psi(wheels));
+  };
+  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, counts))
+    filter_.weigh_again(time_.acted(), y, use);
 }
 
 Vec2 MipEkf::wheel_rate_rad_s() const noexcept {

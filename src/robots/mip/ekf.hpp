@@ -110,6 +110,8 @@ class MipEkf {
   MipEstimate estimate() const noexcept;
   Vec2 wheel_rate_rad_s() const noexcept;
 
+  /// A wheel's encoder may turn alone: encoder_slip.hpp. Its faults then leave no trace but innovations.
+  void let_encoders_slip(bool slip) noexcept { encoders_slip_ = slip; }
   /// The gyro's bias is known to so much less.
   void doubt_bias(double sigma_rad_s) noexcept {
     filter_.widen(Model::kGyroBias, 1, sigma_rad_s * sigma_rad_s);
@@ -132,6 +134,7 @@ class MipEkf {
   MipKinematics kinematics_;
   Filter filter_;
   TimeBase<2, 2> time_;
+  bool encoders_slip_ = false;
   Vec2 gyro_bias_yz_ = Vec2::Zero();
   double heading_ = 0.0;
   int settling_ = 0;   // ticks left until a push is told

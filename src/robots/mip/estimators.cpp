@@ -45,7 +45,9 @@ MipEstimators::MipEstimators(const Params& params)
       isolation_(ekf_, kPlay_rad),
       gyro_watch_(gyro_watch(params)),
       dead_encoders_(Vec2(kinematics_.psi(Vec2::UnitX()), kinematics_.psi(Vec2::UnitY()))),
-      ekf_published_(MipPublishedModel{}, params.ekf_published) {}
+      ekf_published_(MipPublishedModel{}, params.ekf_published) {
+  ekf_.let_encoders_slip(!params.detection);  // else the detectors judge what an encoder does to the filter
+}
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {
   const double lean = rest_tilt_.update(z.accel_B_m_s2).x();

@@ -49,7 +49,7 @@ def _five(theta: np.ndarray, phi_dot: np.ndarray) -> np.ndarray:
 
 
 def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, seed: int, **more) -> Flight:
-    """The default filter flies; the function beside it only listens."""
+    """The default filter flies, in double precision as those beside it; the function only listens."""
     heard: list[tuple] = []
     sound: list[bool] = []
 
@@ -68,6 +68,7 @@ def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, s
         robot_number=robot_number,
         estimator=listen,
         record=True,
+        set={"estimator.ekf.precision": "double"},
         **more,
     )
     if not all(sound) or run.degraded:

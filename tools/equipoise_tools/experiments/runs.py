@@ -29,6 +29,8 @@ NO_GATES = {
     "safety.encoder_probe_drive": 0,
 }
 AS_PUBLISHED = published.control()
+# [T] computes in double precision: no difference to it comes from rounding.
+PRECISION = {"estimator.ekf.precision": "double"}
 
 
 # Filters that take an attitude from the simulated packets: its error is put in.
@@ -65,7 +67,7 @@ def _sim(log: Path | str, config: str, sets: dict[str, object] | None, options: 
     for key, value in options.items():
         flag = "--" + key.replace("_", "-")
         arguments += [flag] if value is True else [flag, value]
-    for key, value in (sets or {}).items():
+    for key, value in {**PRECISION, **(sets or {})}.items():
         arguments += ["--set", f"{key}={value}"]
     return json.loads(equipoise(*arguments, fails=True))
 

@@ -1,0 +1,75 @@
+#include <gtest/gtest.h>
+
+#include "robots/mbbr/config.hpp"
+#include "robots/mbbr/ekf.hpp"
+#include "robots/mip/config.hpp"
+#include "robots/mip/ekf.hpp"
+
+namespace equipoise {
+namespace {
+
+std::string configuration(const char* robot) {
+  return std::string(EQUIPOISE_SOURCE_DIR) + "/config/" + robot + ".toml";
+}
+
+template <class Sample>
+Sample at_rest() {
+  Sample z;
+  z.gyro_B_rad_s.setZero();
+  z.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
+  z.wheel_angle_rad.setZero();
+  z.imu_ok = z.encoders_ok = true;
+  return z;
+}
+
+/// The robot stands; the IMU says so. Half a second without, a tenth with slip, half a second after it.
+TEST(EncoderSlip, AWheelThatSlipsMovesNoBall) {
+  const MbbrConfig config = load_mbbr(configuration("mbbr"), {}).config;
+  const MbbrParameters& p = config.robot;
+  constexpr double kNoLoad_rad_s = 108.0;  // [T] section 6.2.3, at 8 V
+  // What a contact with a grip of 1 may do to a ball alone in a tick; its load: [T] (2.2).
+  const double load_N = p.m_t * kGravity_m_s2 / (3.0 * std::cos(p.alpha_deg * kPi / 180.0));
+  const double most_rad_s = kTickS * load_N * p.r / (p.I_b + p.m_b * p.r * p.r);
+  for (int wheel = 0; wheel < 3; ++wheel) {
+    MbbrEkf filter(p, config.estimators.ekf);
+    filter.let_encoders_slip(true);
+    filter.start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
+    auto z = at_rest<Mbbr::Sample>();
+    for (int k = 1; k <= 220; ++k) {
+      if (k > 100 && k <= 120) z.wheel_angle_rad(wheel) += kTickS * kNoLoad_rad_s;
+      filter.predict(Vec3::Zero());
+      filter.update(z);
+      const MbbrEstimate x = filter.estimate();
+      ASSERT_LT(x.phi_dot_star.norm(), most_rad_s) << wheel << " " << k;
+      ASSERT_LT(x.theta_xy.norm(), 0.01) << wheel << " " << k;
+    }
+    EXPECT_LT(filter.estimate().phi_dot_star.norm(), 0.1 * most_rad_s) << wheel;
+  }
+}
+
+TEST(EncoderSlip, AMotorInItsBacklashMovesNoWheel) {
+  const MipConfig config = load_mip(configuration("edumip"), {}).config;
+  const MipParameters& p = config.robot;
+  constexpr double kBacklash_rad = 0.087;  // 5 degrees: a worn 35:1 gear
+  // What a motor may do to its wheel with half of the body in a tick.
+  const double most_rad_s = kTickS * p.k1 / (p.I_w1 + (p.m_w + 0.5 * p.m_b) * p.r * p.r);
+  for (const double other : {0.0, 1.0}) {
+    MipEkf filter(p, config.estimators.ekf);
+    filter.let_encoders_slip(true);
+    filter.start(0.0, Vec3::Zero(), Vec2::Zero());
+    auto z = at_rest<Mip::Sample>();
+    for (int k = 1; k <= 200; ++k) {
+      if (k % 20 == 0) {
+        const double across = k % 40 == 0 ? -kBacklash_rad : kBacklash_rad;
+        z.wheel_angle_rad += across * Vec2(1.0, other);
+      }
+      filter.predict(Vec2::Zero());
+      filter.update(z);
+      ASSERT_LT(std::abs(filter.estimate().phi_dot), most_rad_s) << other << " " << k;
+      ASSERT_LT(std::abs(filter.estimate().theta), 0.01) << other << " " << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace equipoise
