@@ -23,10 +23,6 @@ std::string world_key(const Section& worlds, const std::string& fidelity) {
 
 }  // namespace
 
-double number_or(Section& s, const char* key, double otherwise, double min, double max) {
-  return s.has(key) ? s.number(key, min, max) : otherwise;
-}
-
 void expect_robot(Section& robot, const std::string& type) {
   const std::string found = robot.text("type");
   if (found != type) robot.fail("type", "\"" + found + "\" is not this robot; expected " + type);

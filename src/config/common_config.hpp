@@ -23,9 +23,6 @@ namespace equipoise::config {
 /// ConfigError unless the file is for this robot.
 void expect_robot(Section& robot, const std::string& type);
 
-/// For keys that logs of earlier builds lack.
-double number_or(Section& s, const char* key, double otherwise, double min, double max);
-
 /// ConfigError when compensated friction takes all that a command may ask for.
 void require_room(const Section& reference, const DutyBudget& budget);
 

@@ -92,4 +92,9 @@ class Section {
   std::set<std::string> asked_;
 };
 
+/// For keys that may be absent, and those that logs of earlier builds lack.
+inline double number_or(Section& s, const char* key, double otherwise, double min, double max) {
+  return s.has(key) ? s.number(key, min, max) : otherwise;
+}
+
 }  // namespace equipoise::config

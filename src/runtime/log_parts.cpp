@@ -1,8 +1,9 @@
 #include "equipoise/runtime/log_parts.hpp"
 
+#include <regex.h>
+
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -13,10 +14,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool digits(const std::string& text, std::size_t from, std::size_t count) {
-  return text.size() >= from + count && std::all_of(text.begin() + static_cast<std::ptrdiff_t>(from),
-                                                    text.begin() + static_cast<std::ptrdiff_t>(from + count),
-                                                    [](unsigned char c) { return std::isdigit(c) != 0; });
+bool matches(const std::string& text, const char* pattern) {
+  regex_t compiled;
+  if (regcomp(&compiled, pattern, REG_EXTENDED | REG_NOSUB) != 0) return false;
+  const bool found = regexec(&compiled, text.c_str(), 0, nullptr, 0) == 0;
+  regfree(&compiled);
+  return found;
 }
 
 /// What stands between NAME and the suffix in each file beside `path` that has both.
@@ -39,28 +42,9 @@ std::string with_middle(const fs::path& path, const std::string& middle) {
   return (path.parent_path() / (path.stem().string() + "." + middle + path.extension().string())).string();
 }
 
-/// Takes `count` or more digits from the front.
-bool take_digits(std::string* text, std::size_t count, bool more) {
-  std::size_t n = 0;
-  while (n < text->size() && std::isdigit(static_cast<unsigned char>((*text)[n])) != 0) ++n;
-  if (n < count || (n > count && !more)) return false;
-  text->erase(0, n);
-  return true;
-}
-bool take(std::string* text, char c) {
-  if (text->empty() || text->front() != c) return false;
-  text->erase(0, 1);
-  return true;
-}
-
 /// What kept_name writes: 20261122T014503Z, -2 of a second in that second, .0001 of a part behind it.
-bool is_stamp(std::string text) {
-  if (!take_digits(&text, 8, false) || !take(&text, 'T') || !take_digits(&text, 6, false) ||
-      !take(&text, 'Z'))
-    return false;
-  if (take(&text, '-') && !take_digits(&text, 1, true)) return false;
-  if (take(&text, '.') && !take_digits(&text, 4, true)) return false;
-  return text.empty();
+bool is_stamp(const std::string& text) {
+  return matches(text, "^[0-9]{8}T[0-9]{6}Z(-[0-9]+)?(\\.[0-9]{4,})?$");
 }
 
 /// Event number at the start of an LCM log; -1: no log.
@@ -97,11 +81,10 @@ int log_part_number(const std::string& path, const std::string& part) {
 /// The events of a log are numbered through all its parts: a file whose name merely looks like a part's is
 /// another log, begun at 0, or none.
 std::vector<std::string> existing_log_parts(const std::string& path) {
-  constexpr std::size_t kMostDigits = 9;
   std::vector<int> numbers;
   for (const std::string& middle : middles(path)) {
-    const bool number = middle.size() <= kMostDigits && digits(middle, 0, middle.size());
-    if (!number || with_middle(path, middle) != log_part(path, std::stoi(middle))) continue;
+    if (!matches(middle, "^[0-9]{1,9}$") || with_middle(path, middle) != log_part(path, std::stoi(middle)))
+      continue;
     if (first_event_number(with_middle(path, middle)) > 0) numbers.push_back(std::stoi(middle));
   }
   std::sort(numbers.begin(), numbers.end());

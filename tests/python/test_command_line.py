@@ -128,29 +128,34 @@ COMPLETIONS = [
 ]
 
 
+@pytest.fixture
+def shells(binary, tmp_path):
+    """Where shells find the program: the environment."""
+    (tmp_path / "equipoise").symlink_to(binary)
+    return {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "HOME": str(tmp_path)}
+
+
 @pytest.mark.parametrize(("line", "wanted"), COMPLETIONS)
-def test_bash_completes(binary, tmp_path, line, wanted):
+def test_bash_completes(shells, tmp_path, line, wanted):
     words = line.split(" ")
     program = f"""
-source <({binary} completion bash)
+source <(equipoise completion bash)
 COMP_WORDS=({" ".join(words)}) COMP_CWORD={len(words) - 1} COMPREPLY=()
 _equipoise
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """
-    ended = subprocess.run(["bash", "-c", program], capture_output=True, text=True, cwd=tmp_path)
+    ended = subprocess.run(["bash", "-c", program], capture_output=True, text=True, cwd=tmp_path, env=shells)
     assert ended.stderr == ""
     assert set(ended.stdout.split()) == wanted
 
 
 @pytest.mark.parametrize(("line", "wanted"), COMPLETIONS)
-def test_fish_completes(binary, tmp_path, line, wanted):
+def test_fish_completes(shells, tmp_path, line, wanted):
     if shutil.which("fish") is None:
         pytest.skip("needs fish")
-    (tmp_path / "equipoise").symlink_to(binary)
     program = f"equipoise completion fish | source; complete -C {line!r}"
-    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "HOME": str(tmp_path)}
     ended = subprocess.run(
-        ["fish", "--no-config", "-c", program], capture_output=True, text=True, cwd=tmp_path, env=environment
+        ["fish", "--no-config", "-c", program], capture_output=True, text=True, cwd=tmp_path, env=shells
     )
     assert ended.stderr == ""
     found = {offer.split("\t")[0] for offer in ended.stdout.splitlines()}
@@ -158,7 +163,7 @@ def test_fish_completes(binary, tmp_path, line, wanted):
 
 
 @pytest.mark.parametrize(("line", "wanted"), COMPLETIONS)
-def test_zsh_completes(binary, tmp_path, line, wanted):
+def test_zsh_completes(binary, shells, tmp_path, line, wanted):
     if shutil.which("zsh") is None:
         pytest.skip("needs zsh")
     (tmp_path / "_equipoise").write_text(run(binary, "completion", "zsh").stdout)
@@ -169,7 +174,7 @@ def test_zsh_completes(binary, tmp_path, line, wanted):
         stdout=slave,
         stderr=slave,
         cwd=tmp_path,
-        env={**os.environ, "TERM": "dumb", "PS1": "", "HOME": str(tmp_path), "COLUMNS": "200"},
+        env={**shells, "TERM": "dumb", "PS1": "", "COLUMNS": "200"},
         start_new_session=True,
     )
     os.close(slave)

@@ -94,7 +94,7 @@ def test_unusable_logs_are_refused_in_one_line(tmp_path, rows, head, message):
 
 
 def test_no_log_and_a_wrong_one_are_usage_errors(tmp_path):
-    assert "cannot be opened" in run("identify", "motor", tmp_path / "none.lcm", status=2).stderr
+    assert "cannot be read" in run("identify", "motor", tmp_path / "none.lcm", status=2).stderr
     junk = tmp_path / "junk.lcm"
     junk.write_bytes(b"not a log" * 100)
     assert "not an LCM event log" in run("identify", "friction", junk, status=2).stderr

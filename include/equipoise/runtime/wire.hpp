@@ -55,33 +55,10 @@ using Unsigned = std::conditional_t<sizeof(T) == 8, std::uint64_t,
 /// Of a text in a message: LCM's strings hold no zero but their last.
 inline std::size_t text_length(const std::string& text) { return std::min(text.find('\0'), text.size()); }
 
-/// Counts the bytes that Encoder writes; a constant where there is no text.
-class Sizer {
- public:
-  template <class T>
-  void operator()(const char*, const char*, const T& value) {
-    put(value);
-  }
-  template <class T>
-  void put(const T& value) {
-    if constexpr (kIsScalar<T>) {
-      size_ += sizeof(Unsigned<T>);
-    } else if constexpr (std::is_same_v<T, std::string>) {
-      size_ += sizeof(std::int32_t) + text_length(value) + 1;
-    } else {
-      size_ += std::size(value) * sizeof(Unsigned<std::decay_t<decltype(*std::begin(value))>>);
-    }
-  }
-  std::size_t size() const { return size_; }
-
- private:
-  std::size_t size_ = 0;
-};
-
-/// Writes where there is room for it.
+/// Counts bytes, and writes them where there is room: into nullptr they are only counted.
 class Encoder {
  public:
-  explicit Encoder(std::uint8_t* to) : at_(to) {}
+  explicit Encoder(std::uint8_t* to) : to_(to) {}
 
   template <class T>
   void operator()(const char*, const char*, const T& value) {
@@ -92,20 +69,22 @@ class Encoder {
     if constexpr (kIsScalar<T>) {
       Unsigned<T> bits{};
       std::memcpy(&bits, &value, sizeof value);
-      at_ = store_big_endian(bits, at_);
+      if (to_ != nullptr) store_big_endian(bits, to_ + size_);
+      size_ += sizeof bits;
     } else if constexpr (std::is_same_v<T, std::string>) {
       const std::size_t length = text_length(value);
       put(static_cast<std::int32_t>(length + 1));
-      std::memcpy(at_, value.data(), length);
-      at_[length] = 0;
-      at_ += length + 1;
+      for (std::size_t i = 0; i < length; ++i) put(value[i]);
+      put('\0');
     } else {
       for (const auto& element : value) put(element);
     }
   }
+  std::size_t size() const { return size_; }
 
  private:
-  std::uint8_t* at_;
+  std::uint8_t* to_;
+  std::size_t size_ = 0;
 };
 
 class Decoder {
@@ -170,9 +149,9 @@ void walk(Message message, const Record& record, std::int64_t utime, std::int64_
 
 template <class Message, class Record>
 std::size_t encoded_size(Message message, const Record& record) {
-  wire::Sizer sizer;
-  walk(message, record, 0, 0, sizer);
-  return sizer.size();
+  wire::Encoder counting(nullptr);
+  walk(message, record, 0, 0, counting);
+  return counting.size();
 }
 
 /// `to`: room for encoded_size() bytes.

@@ -29,7 +29,6 @@ void add_commands(Subcommand app) {
   add_bringup(app);
   add_completion(app);
   add_man(app);
-  add_dbc(app);
 }
 
 }  // namespace equipoise::app

@@ -34,6 +34,5 @@ void add_calibrate(Subcommand app);
 void add_bringup(Subcommand app);
 void add_completion(Subcommand app);
 void add_man(Subcommand app);
-void add_dbc(Subcommand app);
 
 }  // namespace equipoise::app

@@ -28,9 +28,14 @@ void add_completion(Subcommand app) {
       app.subcommand("completion", "Prints a script with which a shell completes commands and options")
           .example("source <(equipoise completion bash)");
   auto shell = std::make_shared<std::string>();
-  command.option("shell", *shell, "whose").required().one_of({"bash", "zsh", "fish"});
+  auto words = std::make_shared<std::vector<std::string>>();
+  command.option("shell", *shell, "bash, zsh, fish; words: what such a script asks for, the ways to go on")
+      .required()
+      .one_of({"bash", "zsh", "fish", "words"});
+  command.option("line", *words, "the words so far, behind --; the last is begun");
   command.action([=] {
-    std::printf("%s", completion(app.describe(), *shell).c_str());
+    const bool asked = *shell == "words";
+    std::printf("%s", (asked ? offers(app.describe(), *words) : completion(*shell)).c_str());
     return 0;
   });
 }

@@ -26,14 +26,19 @@ struct CommandDescription {
   std::string example;
   std::vector<OptionDescription> options;
   std::vector<CommandDescription> commands;
+
+  std::string last_word() const { return name.substr(name.rfind(' ') + 1); }
 };
 
 /// f(command) for the root and all below, parents first.
 void for_each_command(const CommandDescription& command,
                       const std::function<void(const CommandDescription&)>& f);
 
-/// A script for the shell: bash, zsh or fish.
-std::string completion(const CommandDescription& program, const std::string& shell);
+/// A script for the shell, bash, zsh or fish, which asks for offers().
+std::string completion(const std::string& shell);
+
+/// What the last of these words may become, a line each: the word, a tab, its help.
+std::string offers(const CommandDescription& program, const std::vector<std::string>& words);
 
 /// Manual page of a command or, of the root, of the program: roff, section 1.
 std::string manual_page(const CommandDescription& command, const std::string& version);

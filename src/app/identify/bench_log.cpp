@@ -6,29 +6,19 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <equipoise/bench_t.hpp>
 #include <limits>
 #include <memory>
-#include <sstream>
 
-#include "app/cli/commands.hpp"
-#include "app/text/files.hpp"
+#include "app/import/table.hpp"
+#include "app/log/log_reader.hpp"
+#include "app/text/errors.hpp"
 
 namespace equipoise::app {
 namespace {
 
 constexpr const char* kChannel = "EQUIPOISE_BENCH";
-
-struct CloseLog {
-  void operator()(lcm_eventlog_t* log) const { lcm_eventlog_destroy(log); }
-};
-using LogFile = std::unique_ptr<lcm_eventlog_t, CloseLog>;
-
-struct FreeEvent {
-  void operator()(lcm_eventlog_event_t* event) const { lcm_eventlog_free_event(event); }
-};
 
 void append(const std::string& path, const BenchSample& row, BenchLog* log) {
   if (!log->rows.empty() && !(row.t_s > log->rows.back().t_s)) {
@@ -37,10 +27,72 @@ void append(const std::string& path, const BenchSample& row, BenchLog* log) {
   log->rows.push_back(row);
 }
 
+BenchLog read_lcm(const std::string& path) {
+  LogReader reader = LogReader::open(path);
+  BenchLog log;
+  bench_t message{};
+  std::size_t events = 0;
+  for (LogEvent event; reader.next(&event); ++events) {
+    if (event.channel != kChannel) continue;
+    if (message.decode(event.data.data(), 0, static_cast<int>(event.data.size())) < 0) {
+      throw InputError(path + ": " + kChannel + " has messages of another version of bench_t");
+    }
+    if (log.rows.empty()) {
+      log.axis = message.axis;
+      log.radius_ratio = message.radius_ratio;
+      log.bridge = message.bridge == 1   ? LoggedBridge::kDriveBrake
+                   : message.bridge == 2 ? LoggedBridge::kDriveCoast
+                                         : LoggedBridge::kUnknown;
+    }
+    const double t_s = 1e-6 * static_cast<double>(message.utime);
+    append(path, {t_s, message.u, message.current_A, message.supply_V, message.angle_rad}, &log);
+  }
+  if (events == 0) throw InputError(path + ": is not an LCM event log, or holds no whole event");
+  if (log.rows.empty())
+    throw InputError(path + ": no " + kChannel + " channel; record it with motor-bench --log");
+  return log;
+}
+
+struct Field {
+  const char* name;
+  double BenchSample::*value;
+  bool optional;  // of a bench without the sensor
+};
+
+BenchLog read_csv(const std::string& path) {
+  static constexpr std::array<Field, 5> kFields{{{"t_s", &BenchSample::t_s, false},
+                                                 {"u", &BenchSample::u, false},
+                                                 {"current_A", &BenchSample::current_A, true},
+                                                 {"supply_V", &BenchSample::supply_V, true},
+                                                 {"angle_rad", &BenchSample::angle_rad, false}}};
+  const Table table = read_table(path, {});
+  if (table.torn_rows > 0)
+    throw InputError(path + ": " + std::to_string(table.torn_rows) + " rows have not a cell for each column");
+  std::vector<BenchSample> rows(table.rows());
+  for (const Field& field : kFields) {
+    const auto found = std::find(table.names.begin(), table.names.end(), field.name);
+    const bool there = found != table.names.end();
+    if (!there && !field.optional)
+      throw InputError(path + ":1: no column " + field.name +
+                       "; expected t_s,u,current_A,supply_V,angle_rad");
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      double& value = rows[k].*field.value;
+      value = there ? table.columns[static_cast<std::size_t>(found - table.names.begin())][k]
+                    : std::numeric_limits<double>::quiet_NaN();
+      if (std::isnan(value) && !field.optional)
+        throw InputError(path + ": " + field.name + " is missing in sample " + std::to_string(k));
+    }
+  }
+  BenchLog log;
+  for (const BenchSample& row : rows) append(path, row, &log);
+  return log;
+}
+
 }  // namespace
 
 void write_bench_log(const std::string& path, const BenchLog& log) {
-  const LogFile file(lcm_eventlog_create(path.c_str(), "w"));
+  const std::unique_ptr<lcm_eventlog_t, void (*)(lcm_eventlog_t*)> file(
+      lcm_eventlog_create(path.c_str(), "w"), lcm_eventlog_destroy);
   if (file == nullptr) throw InputError(path + ": log cannot be created: " + std::strerror(errno));
   bench_t message{};
   message.bridge = static_cast<std::int32_t>(log.bridge);
@@ -65,89 +117,6 @@ void write_bench_log(const std::string& path, const BenchLog& log) {
   }
   if (std::fflush(file->f) != 0) throw InputError(path + ": cannot be written: " + std::strerror(errno));
 }
-
-namespace {
-
-BenchLog read_lcm(const std::string& path) {
-  const LogFile file(lcm_eventlog_create(path.c_str(), "r"));
-  if (file == nullptr) throw InputError(path + ": cannot be opened: " + std::strerror(errno));
-  BenchLog log;
-  bench_t message{};
-  std::size_t events = 0;
-  while (auto event =
-             std::unique_ptr<lcm_eventlog_event_t, FreeEvent>(lcm_eventlog_read_next_event(file.get()))) {
-    ++events;
-    if (std::string(event->channel, static_cast<std::size_t>(event->channellen)) != kChannel) continue;
-    if (message.decode(event->data, 0, event->datalen) < 0) {
-      throw InputError(path + ": " + kChannel + " has messages of another version of bench_t");
-    }
-    if (log.rows.empty()) {
-      log.axis = message.axis;
-      log.radius_ratio = message.radius_ratio;
-      log.bridge = message.bridge == 1   ? LoggedBridge::kDriveBrake
-                   : message.bridge == 2 ? LoggedBridge::kDriveCoast
-                                         : LoggedBridge::kUnknown;
-    }
-    const double t_s = 1e-6 * static_cast<double>(message.utime);
-    append(path, {t_s, message.u, message.current_A, message.supply_V, message.angle_rad}, &log);
-  }
-  if (events == 0) throw InputError(path + ": is not an LCM event log, or holds no whole event");
-  if (log.rows.empty())
-    throw InputError(path + ": no " + kChannel + " channel; record it with motor-bench --log");
-  return log;
-}
-
-std::vector<std::string> cells(const std::string& line) {
-  std::vector<std::string> out;
-  std::istringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, ',');) {
-    cell.erase(std::remove_if(cell.begin(), cell.end(), [](unsigned char c) { return std::isspace(c); }),
-               cell.end());
-    out.push_back(cell);
-  }
-  return out;
-}
-
-BenchLog read_csv(const std::string& path) {
-  static constexpr std::array<double BenchSample::*, 5> kFields{
-      &BenchSample::t_s, &BenchSample::u, &BenchSample::current_A, &BenchSample::supply_V,
-      &BenchSample::angle_rad};
-  static const std::array<std::string, 5> kNames{"t_s", "u", "current_A", "supply_V", "angle_rad"};
-  std::istringstream text(read_text(path));
-  std::string line;
-  std::getline(text, line);
-  const std::vector<std::string> head = cells(line);
-  std::array<std::size_t, 5> column{};
-  for (std::size_t f = 0; f < kNames.size(); ++f) {
-    column[f] = static_cast<std::size_t>(std::find(head.begin(), head.end(), kNames[f]) - head.begin());
-    const bool optional = kNames[f] == "current_A" || kNames[f] == "supply_V";
-    if (column[f] == head.size() && !optional) {
-      throw InputError(path + ":1: no column " + kNames[f] + "; expected t_s,u,current_A,supply_V,angle_rad");
-    }
-  }
-  BenchLog log;
-  for (int number = 2; std::getline(text, line); ++number) {
-    const std::vector<std::string> row = cells(line);
-    if (row.empty()) continue;
-    BenchSample sample;
-    for (std::size_t f = 0; f < kNames.size(); ++f) {
-      sample.*kFields[f] = std::numeric_limits<double>::quiet_NaN();
-      if (column[f] == head.size()) continue;
-      const std::string cell = column[f] < row.size() ? row[column[f]] : "";
-      char* end = nullptr;
-      sample.*kFields[f] = std::strtod(cell.c_str(), &end);
-      if (cell.empty() || *end != '\0') {
-        std::string where = path;
-        where.append(":").append(std::to_string(number)).append(": ").append(kNames[f]);
-        throw InputError(where.append(": \"").append(cell).append("\" is not a number"));
-      }
-    }
-    append(path, sample, &log);
-  }
-  return log;
-}
-
-}  // namespace
 
 BenchLog read_bench_log(const std::string& path) {
   const bool csv = path.size() > 4 && path.compare(path.size() - 4, 4, ".csv") == 0;

@@ -194,6 +194,7 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
                      " columns; a robot of type " + robot.run.robot + " has " + std::to_string(wheels) +
                      " wheels");
   }
+  if (table.rows() == 0) throw InputError("the table has no row of numbers");
   const Columns columns(table);
   ImportedRows rows;
   std::vector<std::size_t> used;

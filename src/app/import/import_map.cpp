@@ -10,6 +10,7 @@ namespace equipoise::app {
 namespace {
 
 using config::Document;
+using config::number_or;
 using config::Section;
 using Units = std::map<std::string, double>;
 
@@ -38,18 +39,14 @@ SignedColumn signed_column(const std::string& text, double scale) {
   return {minus ? text.substr(1) : text, minus ? -scale : scale};
 }
 
-double optional_number(Section& s, const char* key, double otherwise, double min, double max) {
-  return s.has(key) ? s.number(key, min, max) : otherwise;
-}
-
 Channel read_channel(Section& s, const Units& units) {
   Channel c;
   const double scale = read_scale(s, units);
   for (const std::string& axis : s.texts("axes")) c.axes.push_back(signed_column(axis, scale));
-  c.quantum = std::abs(scale) * optional_number(s, "quantum", 0.0, 0.0, 1e9);
-  c.range = std::abs(scale) * optional_number(s, "range", 0.0, 0.0, 1e9);
-  c.delay_s = optional_number(s, "delay_s", 0.0, 0.0, 1.0);
-  c.low_pass_hz = optional_number(s, "low_pass_hz", 0.0, 0.1, 1e6);
+  c.quantum = std::abs(scale) * number_or(s, "quantum", 0.0, 0.0, 1e9);
+  c.range = std::abs(scale) * number_or(s, "range", 0.0, 0.0, 1e9);
+  c.delay_s = number_or(s, "delay_s", 0.0, 0.0, 1.0);
+  c.low_pass_hz = number_or(s, "low_pass_hz", 0.0, 0.1, 1e6);
   s.finish();
   return c;
 }
@@ -80,8 +77,8 @@ void read_time(Section s, ImportMap* map) {
   } else {
     map->rate_hz = s.number("rate_hz", 1.0, 1e6);
   }
-  map->from_s = optional_number(s, "from_s", map->from_s, 0.0, 1e9);
-  map->to_s = optional_number(s, "to_s", map->to_s, map->from_s, 1e9);
+  map->from_s = number_or(s, "from_s", map->from_s, 0.0, 1e9);
+  map->to_s = number_or(s, "to_s", map->to_s, map->from_s, 1e9);
   s.finish();
 }
 
