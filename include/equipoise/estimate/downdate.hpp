@@ -14,18 +14,33 @@
 
 namespace equipoise {
 
-/// x += the sum of step (P h) over m rows.
-template <int n, int m, class Real>
-void correct(const Real* step, const Real* Ph, Real* x) noexcept {
+/// x += the sum of step[0] (P h) over m rows; of each further step that sum alone, where `sums` points: what
+/// is loaded of P h serves all.
+template <int n, int m, class Real, std::size_t further = 0>
+void correct(const Real (*step)[m], const Real* Ph, Real* x,
+             const std::array<Real*, further>& sums = {}) noexcept {
+  using One = OneOf<Real>;
   using Two = TwoOf<Real>;
-  Two steps[m];
+  Two steps[1 + further][m];
+#pragma GCC unroll 3
+  for (std::size_t k = 0; k <= further; ++k) {
 #pragma GCC unroll 8
-  for (std::size_t i = 0; i < m; ++i) steps[i] = twice(OneOf<Real>(step[i]));
-  for (Real* const end = x + n; x != end; x += 2, Ph += std::ptrdiff_t{2} * m) {
-    Two both = load(x);
+    for (std::size_t i = 0; i < m; ++i) steps[k][i] = twice(One(step[k][i]));
+  }
+  for (std::ptrdiff_t state = 0; state < n; state += 2, Ph += std::ptrdiff_t{2} * m) {
+    Two sum[1 + further];
+    sum[0] = load(x + state);
+#pragma GCC unroll 2
+    for (std::size_t k = 1; k <= further; ++k) sum[k] = twice(One(0.0));
 #pragma GCC unroll 8
-    for (std::size_t i = 0; i < m; ++i) both = plus(both, steps[i], load(Ph + 2 * i));
-    store(x, both);
+    for (std::size_t i = 0; i < m; ++i) {
+      const Two both = load(Ph + 2 * i);
+#pragma GCC unroll 3
+      for (std::size_t k = 0; k <= further; ++k) sum[k] = plus(sum[k], steps[k][i], both);
+    }
+    store(x + state, sum[0]);
+#pragma GCC unroll 2
+    for (std::size_t k = 1; k <= further; ++k) store(sums[k - 1] + state, sum[k]);
   }
 }
 

@@ -14,6 +14,7 @@
 #include <iterator>
 #include <memory>
 #include <type_traits>
+#include <utility>
 #include <variant>
 
 #include "equipoise/estimate/downdate.hpp"
@@ -152,9 +153,12 @@ class PackedFilter {
   /// By the samples that innovate() was given last, nothing having happened since.
   void correct() noexcept {
     on_core(core_, [&](auto& core) {
-      equipoise::correct<n, m>(core.step, core.Ph, core.x.data());
-      downdate<n, m>(core.weight, core.Ph, core.P.data());
-      if constexpr (std::is_same_v<RealOf<decltype(core)>, float>) restore(core);  // double keeps the digits
+      if constexpr (std::is_same_v<RealOf<decltype(core)>, float>) {
+        correct(core, std::make_index_sequence<kPrecise>());
+      } else {  // keeps the digits
+        equipoise::correct<n, m>(core.step, core.Ph, core.x.data());
+        downdate<n, m>(core.weight, core.Ph, core.P.data());
+      }
       keep_small(core);
       show(core);
     });
@@ -214,9 +218,8 @@ class PackedFilter {
     // Of innovate(), for correct():
     alignas(16) Real Ph[n * m]{};
     Real weight[m]{};
-    Real step[m]{};
+    Real step[1 + kPrecise][m]{};  // the innovations' and, for restore(), columns of the gain
     Real h[Steps::kEntries]{};
-    Real gain[kPrecise * m]{};
   };
   template <class C>
   using RealOf = typename std::decay_t<C>::Number;
@@ -271,8 +274,8 @@ class PackedFilter {
     const Vector<Real, p> acts(u);
     const Vector<Real, m> seen(y - expected_whole_);
     Steps::innovate(*core.k, acts.data(), seen.data(), use.data(), core.R.data(), core.x.data(),
-                    core.P.data() + Steps::kMiddleP, core.Ph + Steps::kMiddlePh, core.weight, core.step,
-                    innovation, variance, nis, core.h, core.gain);
+                    core.P.data() + Steps::kMiddleP, core.Ph + Steps::kMiddlePh, core.weight, core.step[0],
+                    innovation, variance, nis, core.h, core.step[1]);
     for (std::size_t i = 0; i < m; ++i) {
       row_innovation_[i] = static_cast<double>(innovation[i]);
       row_variance_[i] = static_cast<double>(variance[i]);
@@ -280,14 +283,13 @@ class PackedFilter {
     }
   }
 
-  template <class Real>
-  static void restore(Core<Real>& core) noexcept {
-    alignas(16) Real exact[kPrecise * n]{};
+  template <std::size_t... i>
+  static void correct(Core<float>& core, std::index_sequence<i...> /*precise*/) noexcept {
+    alignas(16) float exact[kPrecise * n];
     bool use[kPrecise];
-    for (int i = 0; i < kPrecise; ++i) {
-      use[i] = core.weight[Steps::kPrecise[i][0]] != Real{0};
-      equipoise::correct<n, m>(core.gain + i * m, core.Ph, exact + i * n);
-    }
+    for (int k = 0; k < kPrecise; ++k) use[k] = core.weight[Steps::kPrecise[k][0]] != 0.0F;
+    equipoise::correct<n, m>(core.step, core.Ph, core.x.data(), std::array{(exact + i * n)...});
+    downdate<n, m>(core.weight, core.Ph, core.P.data());
     Steps::restore(use, core.h, exact, core.P.data() + Steps::kMiddleP);
   }
 
