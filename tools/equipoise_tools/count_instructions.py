@@ -302,7 +302,14 @@ def count_all(root: Path) -> dict:
             result["cortex_a8"] = None
             result["cortex_a8_missing"] = str(missing)
     log = root / LOAD_LOG
-    result["firmware"] = firmware_load(log.read_text(encoding="utf-8")) if log.is_file() else None
+    load = firmware_load(log.read_text(encoding="utf-8")) if log.is_file() else None
+    if load is None:  # what was counted last
+        before = json.loads((root / TABLE).read_text(encoding="utf-8"))
+        result["firmware"], result["firmware_commit"] = before["firmware"], before["firmware_commit"]
+    else:
+        commit = ["git", "-C", str(root), "rev-parse", "--short=7", "HEAD"]
+        told = subprocess.run(commit, capture_output=True, text=True, check=True).stdout
+        result["firmware"], result["firmware_commit"] = load, told.strip()
     return result
 
 
@@ -326,7 +333,7 @@ def main() -> int:
     else:
         print("\n".join(table(counts)))
         if counts["firmware"] is not None:
-            print("\n".join(firmware_table(counts["firmware"], counts["cortex_a8"])))
+            print("\n".join(firmware_table(counts)))
         if counts["cortex_a8"] is None:
             print(f"Cortex-A8: not counted ({counts['cortex_a8_missing']})")
         else:

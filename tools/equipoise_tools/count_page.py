@@ -9,6 +9,7 @@ ROBOTS = {"mbbr": "config/mbbr.toml", "mip": "config/edumip.toml"}
 TICK_HZ = 200
 CLOCK_HZ = 1e9
 TABLE = Path("tests/data/instructions.json")
+PRECISION = Path("tests/data/precision.json")  # of equipoise_tools.precision
 PAGE = Path("docs/performance.md")
 MOST_LOAD = 0.09  # of 1 GHz, of the whole firmware
 # Of an instruction outside the tick: LMBench's primitives in the emulated kernel, counted, against the times
@@ -130,7 +131,8 @@ def whole_load(firmware: dict, robots: dict) -> dict[str, dict[int, float]]:
     return load
 
 
-def firmware_table(firmware: dict, robots: dict | None) -> list[str]:
+def firmware_table(counts: dict) -> list[str]:
+    firmware, robots = counts["firmware"], counts["cortex_a8"]
     lines = [
         "",
         "## The whole firmware",
@@ -154,9 +156,10 @@ def firmware_table(firmware: dict, robots: dict | None) -> list[str]:
     return [
         *lines,
         "",
-        "Counted by `./tools/vm-test load`: `equipoise run` with guard, log and telemetry balances a "
-        "simulated robot through a PREEMPT_RT kernel for 20 s; the machine's clock counts instructions, so "
-        "that the kernel's account of who ran how long is their number. System calls are in the row of who "
+        f"Counted at {counts['firmware_commit']} by `./tools/vm-test load`: `equipoise run` with guard, log "
+        "and telemetry balances a simulated robot through a PREEMPT_RT kernel for 20 s; the machine's clock "
+        "counts instructions, so that the kernel's account of who ran how long is their number. System "
+        "calls are in the row of who "
         "made them. Not in it: what the simulated robot takes, and what the kernel takes for it while no "
         f"firmware runs. The tick's cycles are those above. Aimed at: {MOST_LOAD:.0%}, with 3 cycles for an "
         "instruction outside it: LMBench's primitives in the emulated kernel, counted, against the times "
@@ -167,7 +170,52 @@ def firmware_table(firmware: dict, robots: dict | None) -> list[str]:
     ]
 
 
+def precision_table(found: dict) -> list[str]:
+    """Errors of single over double precision."""
+
+    def interval(middle: float, low: float, high: float) -> str:
+        return f"{middle:+.2%} [{low:+.2%}, {high:+.2%}]"
+
+    def row(label: str, cell) -> str:
+        return f"| {label} | " + " | ".join(cell(found[r]) for r in ROBOTS) + " |"
+
+    lines = [
+        "",
+        "## Single and double precision",
+        "| single over double, less 1 | mbbr | mip |",
+        "|---|---|---|",
+    ]
+    for key, name in (
+        ("attitude_rmse_rad", "attitude"),
+        ("yaw_frame_speed_rmse_m_s", "speed in the yaw frame"),
+    ):
+        for share, which in (("0.5", "median"), ("0.95", "95th percentile")):
+            lines.append(row(f"{name}, {which}", lambda r, k=key, s=share: interval(*r[k][s])))
+        lines.append(
+            row(f"{name}, median of a robot's ratio", lambda r, k=key: f"{r[k]['ratio_median']:+.2%}")
+        )
+    ends = "finished: single, double, both"
+    lines.append(
+        row(ends, lambda r: ", ".join(f"{r['finished'][k]:,}" for k in ("single", "double", "both")))
+    )
+    return [
+        *lines,
+        "",
+        f"RMSE over {found['robots']:,} robots of each type ({found['first']} on, a seed each), world "
+        f"`{found['fidelity']}`, {found['duration_s']:g} s, a third each at 0, 1 and 2 Hz, half of them at "
+        "0.1 m/s, once in each precision: `python -m equipoise_tools.precision --write`. Brackets: 95 % of "
+        "resampled robots. A closed loop amplifies the last digit (a count that falls into the next tick, a "
+        "wheel that sticks), so that single runs of any two arithmetically different builds differ.",
+    ]
+
+
 def write_page(root: Path, counts: dict) -> None:
+    (root / TABLE).write_text(json.dumps(counts, indent=1) + "\n", encoding="utf-8")
+    draw_stages(root, counts)
+    (root / PAGE).write_text(performance_page(root), encoding="utf-8")
+
+
+def draw_stages(root: Path, counts: dict) -> None:
     from .style import plt  # only this needs Matplotlib
 
     robots = list(ROBOTS)
@@ -183,13 +231,19 @@ def write_page(root: Path, counts: dict) -> None:
     figure.tight_layout()
     figure.savefig(root / "docs/images/tick-stages.svg", metadata={"Date": None})
     plt.close(figure)
+
+
+def performance_page(root: Path) -> str:
+    """Of the committed numbers."""
+    counts = json.loads((root / TABLE).read_text(encoding="utf-8"))
     text = [
         "# Instructions of a tick",
         "Written by `./tools/count_instructions --write`: counted, not timed, so that the numbers do not "
         "depend on the load of the machine. x86-64 by callgrind; Cortex-A8 by a plugin of qemu-arm. An armed "
-        "tick of the robot as built (world `full`) that turns at 1 Hz; the dense filter is the same model in "
-        "`KalmanFilter`, fixed-size Eigen, in the same binary. While an encoder is under suspicion a bank of "
-        "filters runs beside the first one (wheel_isolation.hpp): how many ran in a tick is counted, too, "
+        "tick of the robot as built (world `built2025`) turning at 1 Hz; the dense filter is the same "
+        "model in `KalmanFilter`, fixed-size Eigen, in the same binary. While an encoder is under suspicion "
+        "a bank of filters runs beside the first one (wheel_isolation.hpp): how many ran in a tick is "
+        "counted, too, "
         "and each is a dense one in the dense tick. tools/test fails when a count on x86 grows by more than "
         "3 %, tools/cross-test when one on the Cortex-A8 does.",
         "",
@@ -202,8 +256,9 @@ def write_page(root: Path, counts: dict) -> None:
     else:
         text += ["", f"Cortex-A8: not counted ({counts['cortex_a8_missing']})."]
     if counts["firmware"] is not None:
-        text += firmware_table(counts["firmware"], counts["cortex_a8"])
+        text += firmware_table(counts)
     else:
         text += ["", "The whole firmware: not counted; run `./tools/vm-test load` before."]
-    (root / PAGE).write_text("\n".join(text) + "\n", encoding="utf-8")
-    (root / TABLE).write_text(json.dumps(counts, indent=1) + "\n", encoding="utf-8")
+    if (root / PRECISION).is_file():
+        text += precision_table(json.loads((root / PRECISION).read_text(encoding="utf-8")))
+    return "\n".join(text) + "\n"
