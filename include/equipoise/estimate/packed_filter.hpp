@@ -183,6 +183,13 @@ class PackedFilter {
     });
   }
 
+  /// The same of the covariance of two states.
+  void correlate(int one, int other, double covariance) noexcept {
+    on_core(core_, [&](auto& core) {
+      core.P[place(one, other)] += static_cast<RealOf<decltype(core)>>(covariance);
+    });
+  }
+
   const Vec<n>& x() const noexcept { return x_; }
   double variance(int state) const noexcept { return P_at(state, state); }
   Mat<n, n> P() const noexcept {

@@ -30,6 +30,8 @@ class RestBias {
     bias_ = bias_B_rad_s;
     known_ = true;
   }
+  /// Standard deviation of the samples, at rest.
+  const Vec3& noise_rad_s() const noexcept { return noise_; }
   /// The robot has been at rest since power-on: the bias is known.
   bool known() const noexcept { return known_; }
 
@@ -57,6 +59,7 @@ class RestBias {
     if (samples_ <= kBlock) return;
     mean_ += (mean - mean_) * kBlock / samples_;
     bias_ = mean_;
+    noise_ = noise;
     known_ = true;
   }
 
@@ -65,6 +68,7 @@ class RestBias {
   Vec3 before_ = Vec3::Zero();
   Vec3 mean_ = Vec3::Zero();  // of the stretch
   Vec3 bias_ = Vec3::Zero();
+  Vec3 noise_ = Vec3::Zero();
   int in_block_ = 0;
   int samples_ = 0;  // in the stretch
   bool known_ = false;

@@ -130,7 +130,28 @@ MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
       kinematics_(robot),
       filter_(Model(robot, params.disturbance_time_constant_s), params.filter, params.precision),
       time_(params.sensor_age_s) {
+  // Gravity turns the body by its weight, the motors turn body and ball against each other.
+  const MbbrCoefficients c = mbbr_coefficients(robot);
+  constexpr double kLeant_rad = 1e-6;
+  const auto rates = [](const Observable::State& x_dot) {
+    return Vec2(x_dot(Model::kThetaDotX), x_dot(Model::kPhiDotX));
+  };
+  const Vec2 on_body =
+      rates(Observable::rate(c, kLeant_rad * Observable::State::Unit(Model::kThetaX), Vec3::Zero())) /
+      (kLeant_rad * robot.m_t * kGravity_m_s2 * robot.l);
+  const Vec2 on_ball =
+      rates(Observable::rate(c, Observable::State::Zero(), Vec3::UnitX())) / robot.k1 + on_body;
+  per_push_ = kTickS * (robot.l * on_body + robot.r * on_ball);
   start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
+}
+
+void MbbrEkf::allow_push(double sigma_N) noexcept {
+  const Vec2 sigma = sigma_N * per_push_;
+  for (int i = 0; i < 2; ++i) {
+    filter_.widen(Model::kThetaDotX + i, 1, sigma.x() * sigma.x());
+    filter_.widen(Model::kPhiDotX + i, 1, sigma.y() * sigma.y());
+    filter_.correlate(Model::kThetaDotX + i, Model::kPhiDotX + i, sigma.x() * sigma.y());
+  }
 }
 
 void MbbrEkf::start(const Vec2& tilt, const Vec3& gyro_bias_B_rad_s, const Vec3& wheel_angle_rad) noexcept {
@@ -213,6 +234,13 @@ void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
 Vec3 MbbrEkf::wheel_rate_rad_s() const noexcept {
   const double scale = 1.0 + x()(Model::kWheelScale);
   return scale * kinematics_.wheels_from_ball(Observable::encoder_rate_B(x().head<10>()));
+}
+
+Vec3 MbbrEkf::wheel_angle_rad() const noexcept {
+  const double scale = 1.0 + x()(Model::kWheelScale);
+  const Vec3 phi_B(x()(Model::kE) - scale * x()(Model::kThetaX),
+                   x()(Model::kE + 1) - scale * x()(Model::kThetaY), x()(Model::kE + 2));
+  return kinematics_.wheels_from_ball(phi_B) + time_.age_s() * wheel_rate_rad_s();
 }
 
 MbbrEstimate MbbrEkf::estimate() const noexcept {

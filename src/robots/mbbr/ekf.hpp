@@ -102,9 +102,20 @@ class MbbrEkf {
   /// Now, that is `sensor_age_s` after the filter's own state.
   MbbrEstimate estimate() const noexcept;
   Vec3 wheel_rate_rad_s() const noexcept;
+  Vec3 wheel_angle_rad() const noexcept;
 
   /// A wheel's encoder may turn alone: encoder_slip.hpp. Its faults then leave no trace but innovations.
   void let_encoders_slip(bool slip) noexcept { encoders_slip_ = slip; }
+
+  /// A force at the body's centre of mass acted in the predicted tick.
+  void allow_push(double sigma_N) noexcept;
+  /// The ball has spun on the floor in it.
+  void allow_spin(double sigma_rad) noexcept { filter_.widen(Model::kE + 2, 1, sigma_rad * sigma_rad); }
+  /// Wheels have slipped on the ball in it.
+  void allow_slip(double sigma_rad) noexcept { filter_.widen(Model::kE, 3, sigma_rad * sigma_rad); }
+
+  static constexpr int kBiases = 2;  // of the gyro, that it estimates
+  double gyro_bias(int axis) const noexcept { return filter_.x()(Model::kBiasX + axis); }
   /// The gyro's bias is known to so much less.
   void doubt_bias(double sigma_rad_s) noexcept { filter_.widen(Model::kBiasX, 2, sigma_rad_s * sigma_rad_s); }
 
@@ -126,6 +137,7 @@ class MbbrEkf {
   Params params_;
   MbbrKinematics kinematics_;
   Filter filter_;
+  Vec2 per_push_;  // change of tilt and ball rate in a tick, per N
   TimeBase<3, 3> time_;
   bool encoders_slip_ = false;
   double gyro_bias_z_ = 0.0;

@@ -1,15 +1,14 @@
 #include "robots/mbbr/estimators.hpp"
 
-#include <Eigen/LU>
-
 namespace equipoise {
 namespace {
 
-constexpr double kMountError_rad = 0.0016;  // 0.01 rad/s at 1 Hz: no sound robot of 201 to 360 strays further
+constexpr double kMountError_rad = 0.0016;  // that is left when the filter has learnt the mount
 // A ball that held and lets go turns the body by 2 rad/s in 0.1 s; the filter then moves the bias by up to
-// 0.06 rad/s (robots 5039, 5538, 5637 of 5001 to 5700).
+// 0.06 rad/s.
 constexpr double kSuddenTurn_rad = 0.02;
 constexpr double kLately_s = 0.1;
+constexpr double kFoundAnew_rad_s = 0.15;  // of a bias that has jumped: what one noisy sample leaves open
 
 template <class Filter, std::size_t M>
 void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
@@ -18,34 +17,14 @@ void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
   filter.update(u, y, use);
 }
 
-/// The ball does not spin about the vertical: the body does.
-Vec3 yaw_from_wheels(const MbbrKinematics& kinematics) {
-  Vec3 yaw;
-  for (int i = 0; i < 3; ++i) yaw(i) = -kinematics.ball_from_wheels(Vec3(Vec3::Unit(i))).z();
-  return yaw;
-}
-
-/// Torque between body and ball turns both: what it does to the body's rates per wheel rate.
-GyroWatchParams<3> gyro_watch(const MbbrEstimatorParams& params) {
-  const MbbrEkfModel model(params.robot, params.ekf.disturbance_time_constant_s);
-  const MbbrKinematics kinematics(params.robot);
-  const Mat<10, 3> B = model.input_matrix().topRows<10>();
-  Mat3 wheels;
-  for (int i = 0; i < 3; ++i)
-    wheels.col(i) = kinematics.wheels_from_ball(MbbrObservable::encoder_rate_B(B.col(i)));
-  const Mat3 body = B.middleRows<3>(MbbrEkfModel::kThetaDotX);
-  GyroWatchParams<3> p;
-  p.from_wheels = body * wheels.inverse();
-  p.by_torque = body;
-  p.sigma_rad_s = {0.045, 0.045, 0.18};     // encoder counts, gravity, play: measured on robots 1 to 8
-  p.slow_sigma_rad_s = {0.03, 0.03, 0.13};  // robots 1 to 100, 301 to 350, 451 to 500
-  p.max_step_rad_s =
-      Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
-  p.per_jump = {4.5, 4.5, 0.0};                                     // 0.22 rad/s; more than sound robots show
-  p.balances = {true, true, false};
-  p.by_rate = {false, false, true};  // the ball does not spin about the vertical
-  p.yaw_from_wheels = yaw_from_wheels(kinematics);
-  p.max_held_slip_rad_s = 0.4;  // sound robots 301 to 400, also in noise: at most 0.23
+/// Encoders of 720 counts (0.0087 rad), and as much again of play between motor and wheel. A wheel without
+/// load turns as fast as the back-EMF lets it.
+SensorFaultsParams sensor_faults(const MbbrParameters& robot) {
+  const double no_load_rad_s = robot.k1 / robot.k2_ball * robot.r / robot.r_w;
+  SensorFaultsParams p;
+  p.balances = p.jumps = {true, true, false};
+  p.evidence.encoder_sigma_rad = 0.012;
+  p.evidence.wheel_step_rad = kTickS * no_load_rad_s;
   return p;
 }
 
@@ -57,15 +36,13 @@ MbbrEstimators::MbbrEstimators(const Params& params)
     : params_(params),
       kinematics_(params.robot),
       ekf_(params.robot, params.ekf),
-      isolation_(ekf_),
-      gyro_watch_(gyro_watch(params)),
-      dead_encoders_(yaw_from_wheels(kinematics_)),
+      faults_(ekf_, sensor_faults(params.robot)),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()
                               : MbbrLinearModel(params.robot, params.kf_yaw_transport),
           params.kf) {
-  ekf_.let_encoders_slip(!params.detection);  // else the detectors judge what an encoder does to the filter
+  ekf_.let_encoders_slip(!params.detection);  // else the detector judges what an encoder does to the filter
 }
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
@@ -73,9 +50,7 @@ void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
 
   ekf_.start(tilt, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
-  isolation_.reset();
-  gyro_watch_.reset();
-  dead_encoders_.reset();
+  faults_.reset(ekf_, rest_bias_.noise_rad_s().norm() / std::sqrt(3.0));
   bias_drift_.reset(ekf_.x().segment<2>(MbbrEkfModel::kBiasX));
   turned_lately_rad_s_ = 0.0;
 
@@ -123,13 +98,10 @@ EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
   h.predicts_wheels = true;
   h.gyro_bias_known = rest_bias_.known();
   if (!params_.detection) return h;
-  report(isolation_, &h);
-  h.dead = dead_encoders_.dead();
-  h.bias_drift_rad_s = bias_drift_.distance();
+  report(faults_, &h);
+  // Another fault may explain what the filter has made of it: a bias.
+  h.bias_drift_rad_s = faults_.suspects() ? 0.0 : bias_drift_.distance();
   h.disturbance = ekf_.x().segment<3>(MbbrEkfModel::kDisturbance).norm();
-  h.gyro_left_out = gyro_watch_.left_out();
-  h.gyro_bias_jumped = gyro_watch_.bias_jumped();
-  h.gyro_trusted = gyro_watch_.trusted();
   return h;
 }
 
@@ -141,33 +113,14 @@ void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
     x = ekf_.estimate();
     return;
   }
-  Mbbr::Sample believed = z;
-  const int jumps = gyro_watch_.bias_jumps();
-  gyro_watch_.screen(believed, x.omega_B, u);
-  if (gyro_watch_.bias_jumps() != jumps) {
-    ekf_.doubt_bias(BiasJump::kDoubt_rad_s);
-    bias_drift_.excuse(BiasJump::kFoundAnew_rad_s);
-  }
-  const double spin_rad_s = Mbbr::vertical_spin_rad_s(x);
-  const double scale = believable_scale(ekf_.x()(MbbrEkfModel::kWheelScale));
-  isolation_.step(ekf_, u, believed, [&](const Vec3& wheel_rates) {
-    return Mbbr::slip_rad_s(wheel_rates / scale, believed.gyro_B_rad_s.z(), kinematics_, spin_rad_s);
-  });
+  const int jumps = faults_.bias_jumps();
+  faults_.step(ekf_, u, z, x.omega_B);
+  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(kFoundAnew_rad_s);
   // What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
   const double turns_rad_s = x.omega_B.z();
   turned_lately_rad_s_ += kTickS / kLately_s * (turns_rad_s - turned_lately_rad_s_);
   bias_drift_.update(ekf_.x().segment<2>(MbbrEkfModel::kBiasX), kMountError_rad * std::abs(turns_rad_s),
                      kSuddenTurn_rad * std::abs(turns_rad_s - turned_lately_rad_s_));
-  dead_encoders_.update(believed, isolation_.lost());
-  const Vec2 carried = x.theta_dot.z() * Vec2(x.phi_dot_star.y(), -x.phi_dot_star.x());
-  GyroWitness<Mbbr::kWheels> witness;
-  witness.blamed_wheel = isolation_.lost();
-  witness.wheel_stands = isolation_.stands_still();
-  witness.held_slip_rad_s = isolation_.held_slip_rad_s();
-  witness.accel_nis = ekf_.row_nis()[MbbrEkfModel::kAccel] + ekf_.row_nis()[MbbrEkfModel::kAccel + 1];
-  witness.carried_rad_s2 = kinematics_.wheels_from_ball(Vec3(carried.x(), carried.y(), 0.0));
-  witness.rate_rad_s.z() = spin_rad_s;
-  gyro_watch_.compare(believed, witness);
   x = ekf_.estimate();
 }
 

@@ -7,14 +7,12 @@
 
 #include <array>
 
-#include "equipoise/estimate/dead_encoders.hpp"
-#include "equipoise/estimate/gyro_watch.hpp"
 #include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "equipoise/estimate/sensor_faults.hpp"
 #include "equipoise/estimate/slow_drift.hpp"
-#include "equipoise/estimate/wheel_isolation.hpp"
 #include "robots/mbbr/ekf.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/mbbr.hpp"
@@ -64,10 +62,10 @@ class MbbrEstimators {
   const MbbrEkf& ekf() const noexcept { return ekf_; }
   /// Of the active estimator; only the default filter tells.
   EstimatorHealth<Mbbr::kWheels> health() const noexcept;
-  /// It finds a lying encoder by itself.
+  /// It finds a faulty encoder by itself.
   bool isolates() const noexcept { return params_.active == Id::kEkf; }
-  /// Default filters that run: one, and the bank that looks for a lying encoder; see wheel_isolation.hpp.
-  int filters() const noexcept { return isolation_.filters(); }
+  /// Default filters that run: the control's, and those that look for faults; see sensor_faults.hpp.
+  int filters() const noexcept { return params_.detection ? static_cast<int>(faults_.kCount) + 2 : 1; }
   bool reads_attitude() const noexcept { return runs(Id::kKfAttitude); }
 
  private:
@@ -83,9 +81,7 @@ class MbbrEstimators {
   Params params_;
   MbbrKinematics kinematics_;
   MbbrEkf ekf_;
-  WheelIsolation<MbbrEkf, Mbbr::kWheels> isolation_;
-  GyroWatch<Mbbr::kWheels> gyro_watch_;
-  DeadEncoders<Mbbr::kWheels> dead_encoders_;
+  SensorFaults<MbbrEkf, Mbbr::kWheels> faults_;
   SlowDrift<2> bias_drift_;
   double turned_lately_rad_s_ = 0.0;  // about z
   KalmanFilter<MbbrPublishedModel> ekf13_published_;

@@ -67,7 +67,7 @@ COMMANDS = (
 
 ESTIMATORS = (
     *("bias_jump", "dead_encoders", "gyro_watch", "heun", "kalman"),
-    *("rest_bias", "slow_drift", "time_base", "wheel_isolation"),
+    *("rest_bias", "sensor_faults", "slow_drift", "time_base", "wheel_isolation"),
 )
 # Where the filters of the robots are instantiated, once for all who use them.
 FILTERS = ("src/robots/mbbr/ekf.cpp", "src/robots/mip/ekf.cpp")

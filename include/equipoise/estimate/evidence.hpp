@@ -1,0 +1,157 @@
+// What samples say for a filter: the log density of its innovations, bounded, since models err and samples
+// are shaken (Huber 1965). In: filter after its update, Measurement -> out: nats. What the gyro shakes is
+// learnt on the way. RT-safe. Filter: row_innovation, row_variance. Derivation: docs/faults.md.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+struct EvidenceParams {
+  std::array<bool, 3> idle{};      // gyro axes that a rough floor turns: they are no evidence
+  double encoder_sigma_rad = 0.0;  // counts and play
+  double wheel_step_rad = 0.0;     // that a wheel turns in a tick, at most
+};
+
+template <class Filter, int Wheels>
+class Evidence {
+ public:
+  using Sample = Measurement<Wheels>;
+  using Model = typename Filter::Model;
+  static constexpr std::size_t kRows = static_cast<std::size_t>(Model::kOutputs);
+  static constexpr std::size_t kWheelRow = static_cast<std::size_t>(Model::kWheel);
+  static constexpr std::size_t kAccelRow = kWheelRow + static_cast<std::size_t>(Wheels);
+
+  explicit Evidence(const EvidenceParams& params) : p_(params) {}
+
+  /// `sigma_rad_s`: of the gyro, while the robot was at rest.
+  void reset(double sigma_rad_s) noexcept {
+    const double sigma = std::min(sigma_rad_s, kMostVibration_rad_s);
+    vibration_ = sigma * sigma;
+    surprise_ = 0.0;
+    still_.fill(0);
+    forget();
+  }
+  /// The samples before the next are not known.
+  void forget() noexcept { known_ = false; }
+
+  /// A tick's first: what is expected of the others, and its own.
+  double expect(const Filter& f, const Sample& used, const Sample& came) noexcept {
+    double misfit = 0.0;
+    const double density = log_density(f, used, came, &misfit);
+    expected_ = density + misfit;
+    surprise_ = 2.0 * misfit / static_cast<double>(kRows);
+    return bounded(density);
+  }
+  double operator()(const Filter& f, const Sample& used, const Sample& came) const noexcept {
+    double misfit = 0.0;
+    return bounded(log_density(f, used, came, &misfit));
+  }
+  /// What no filter explains is vibration; the median of the gyro's axes, for one may be faulty. `least`: of
+  /// the squared innovations of all filters.
+  void learn_vibration(const Filter& f, const Sample& used, const std::array<double, 3>& least) noexcept {
+    if (!(comes(used, 0) && comes(used, 1) && comes(used, 2))) return;
+    const auto [a, b, c] = least;
+    const double median = std::max(std::min(a, b), std::min(std::max(a, b), c));
+    const auto& expected = f.row_variance();
+    const double floor = std::max(vibration_, *std::min_element(expected.begin(), expected.begin() + 3));
+    const double most = std::min(9.0 * floor, kMostVibration_rad_s * kMostVibration_rad_s);  // 3 sigma
+    vibration_ += kVibrationMean * (std::min(median / kMedianOfThree, most) - vibration_);
+  }
+  /// The tick is over.
+  void hear(const Sample& z) noexcept {
+    for (std::size_t i = 0; i < still_.size(); ++i)
+      still_[i] = known_ && repeats(kWheelRow + i, z) ? still_[i] + 1 : 0;
+    before_ = z;
+    known_ = z.encoders_ok;
+  }
+
+  bool known() const noexcept { return known_; }
+  const Sample& before() const noexcept { return before_; }
+  /// Ticks since an encoder has counted.
+  int still(std::size_t wheel) const noexcept { return still_[wheel]; }
+  /// Mean of the rows' squared innovations over what is expected of them, in what is used.
+  double surprise() const noexcept { return surprise_; }
+
+  /// Variance of an innovation: what the filter expects, at least what vibrates, and the model's error.
+  double spread(const Filter& f, std::size_t row) const noexcept {
+    return kModelError * kModelError * std::max(f.row_variance()[row], row < 3 ? vibration_ : 0.0);
+  }
+  static double squared(const Filter& f, std::size_t row) noexcept {
+    return f.row_innovation()[row] * f.row_innovation()[row];
+  }
+  static bool comes(const Sample& z, std::size_t row) noexcept {
+    if (row < 3) return z.imu_ok && z.gyro_axis_ok[row];
+    if (row < kAccelRow) return z.encoders_ok && z.wheel_ok[row - kWheelRow];
+    return z.imu_ok;
+  }
+  /// Of gyro and encoders.
+  static double reading(const Sample& z, std::size_t row) noexcept {
+    return row < 3 ? z.gyro_B_rad_s(static_cast<int>(row))
+                   : z.wheel_angle_rad(static_cast<int>(row - kWheelRow));
+  }
+
+  static constexpr double kOutlier = 12.0;  // nats, that one tick may say at most
+
+ private:
+  static constexpr double kModelError = 2.0;      // NIS of real logs reaches 4: docs/reality.md
+  static constexpr double kShaken = 0.05;         // share of an IMU's samples beyond five sigma, real logs
+  static constexpr double kVibrationMean = 0.01;  // half a second
+  static constexpr double kMedianOfThree = 0.6;   // of squared normal numbers
+  static constexpr double kMostVibration_rad_s = 0.1;  // real robots that roll
+  static constexpr double kGyroRange_rad_s = 2.0;      // a faulty axis reads anything within: a body's rates
+  static constexpr double kAccelRange_m_s2 = 10.0;
+
+  bool repeats(std::size_t row, const Sample& z) const noexcept {
+    return reading(z, row) == reading(before_, row);
+  }
+
+  /// Of the rows that came; those that are not used, as a faulty sensor has them.
+  double log_density(const Filter& f, const Sample& used, const Sample& came, double* misfit) const noexcept {
+    double sum = 0.0;
+    for (std::size_t row = 0; row < kRows; ++row) {
+      if (!comes(came, row) || (row < 3 && p_.idle[row])) continue;
+      const double faulty = log_faulty(row, came);
+      if (!comes(used, row)) {
+        sum += faulty;
+        continue;
+      }
+      const double variance = spread(f, row);
+      const double peak = -0.5 * std::log(2.0 * kPi * variance);
+      double density = peak - 0.5 * squared(f, row) / variance;
+      if (!(density > -1e6)) return -1e6;  // the filter has diverged
+      const bool imu = row < 3 || row >= kAccelRow;
+      if (imu) density = std::max(density, faulty + std::log(kShaken));
+      sum += density;
+      *misfit += peak - density;
+    }
+    return sum;
+  }
+
+  /// A faulty sensor reads anything in its range; half of the faulty encoders stand still.
+  double log_faulty(std::size_t row, const Sample& came) const noexcept {
+    if (row < 3) return -std::log(2.0 * kGyroRange_rad_s);
+    if (row >= kAccelRow) return -std::log(2.0 * kAccelRange_m_s2);
+    const bool stands = known_ && repeats(row, came);
+    const double still = stands ? 1.0 / (std::sqrt(2.0 * kPi) * kModelError * p_.encoder_sigma_rad) : 0.0;
+    return std::log(0.5 / (2.0 * p_.wheel_step_rad) + 0.5 * still);
+  }
+
+  double bounded(double log_density) const noexcept {
+    return std::log(std::exp(std::min(log_density - expected_, 100.0)) + std::exp(-kOutlier));
+  }
+
+  EvidenceParams p_;
+  double vibration_ = 0.0;  // variance of the gyro
+  double expected_ = 0.0;   // log density of what is expected
+  double surprise_ = 0.0;
+  Sample before_;  // a tick ago
+  bool known_ = false;
+  std::array<int, static_cast<std::size_t>(Wheels)> still_{};
+};
+
+}  // namespace equipoise

@@ -1,0 +1,60 @@
+// Samples of an IMU that no motion explains: glitches are not used, a few in a row; an axis that repeats its
+// counts while the body turns is dead. In: Measurement, what the gyro should read -> out: what may be used.
+// RT-safe.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+class GrossSamples {
+ public:
+  /// `balances`: axes of the gyro without which the robot falls.
+  explicit GrossSamples(const std::array<bool, 3>& balances) : balances_(balances) {}
+
+  void reset() noexcept {
+    gross_ = frozen_ = 0;
+    trusted_ = true;
+  }
+
+  template <int Wheels>
+  Measurement<Wheels> without(const Measurement<Wheels>& raw, const Vec3& expected_rad_s) noexcept {
+    Measurement<Wheels> z = raw;
+    const Vec3 away = z.gyro_B_rad_s - expected_rad_s;
+    const bool gross = z.imu_ok && !(away.norm() < kGross_rad_s && z.accel_B_m_s2.norm() < kGross_m_s2);
+    gross_ = gross ? gross_ + 1 : 0;
+    if (gross && gross_ <= kGlitch) z.imu_ok = false;
+    bool frozen = false;
+    double balance_rad_s = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!balances_[i]) continue;
+      const double away_rad_s = std::abs(away(static_cast<int>(i)));
+      balance_rad_s = std::max(balance_rad_s, away_rad_s);
+      frozen = frozen || (z.imu_ok && !z.gyro_axis_ok[i] && away_rad_s > kTurns_rad_s);
+    }
+    frozen_ = frozen ? frozen_ + 1 : 0;
+    trusted_ = trusted_ && frozen_ <= kFrozenTicks && !(gross_ > kGlitch && balance_rad_s > kGross_rad_s);
+    return z;
+  }
+
+  bool trusted() const noexcept { return trusted_; }
+  bool frozen() const noexcept { return frozen_ >= kFrozenTicks; }
+
+ private:
+  static constexpr double kGross_rad_s = 3.0;  // between two samples: 600 rad/s2
+  static constexpr double kGross_m_s2 = 4.0 * kGravity_m_s2;
+  static constexpr int kGlitch = 3;             // samples in a row; more are not
+  static constexpr double kTurns_rad_s = 0.05;  // 50 counts
+  static constexpr int kFrozenTicks = 4;
+
+  std::array<bool, 3> balances_;
+  int gross_ = 0;  // ticks in a row
+  int frozen_ = 0;
+  bool trusted_ = true;
+};
+
+}  // namespace equipoise

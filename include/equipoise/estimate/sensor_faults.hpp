@@ -1,0 +1,400 @@
+// Which sensor is faulty? One filter per hypothesis runs beside the one that uses every sensor
+// (multiple-model estimation: Magill 1965). A hypothesis' log-likelihood ratio is summed since it was last
+// refuted (CUSUM: Page 1954); beyond a bound, which a rate of false alarms gives (Lorden 1971), the one that
+// leads all others by a margin changes which sensors are used; else none is trusted. Slipping and pushes are
+// hypotheses, too, of healthy robots. Derivation and constants: docs/faults.md. In: input, Measurement ->
+// out: the control's filter, which sensors it uses, whether they can be trusted. RT-safe. Filter: predict,
+// update, adopt, row_innovation, row_variance, wheel_angle_rad, allow_push, allow_slip, doubt_bias.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "equipoise/estimate/evidence.hpp"
+#include "equipoise/estimate/fault_hypotheses.hpp"
+#include "equipoise/estimate/gross_samples.hpp"
+#include "equipoise/estimate/health.hpp"
+#include "equipoise/estimate/used_sensors.hpp"
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+struct SensorFaultsParams {
+  EvidenceParams evidence;
+  std::array<bool, 3> balances{};  // gyro axes without which the robot falls
+  std::array<bool, 3> jumps{};     // whose bias jumps, together
+  double calm_N = 0.0;             // that pushes a robot always: a slope, a cable
+  double push_m_s2 = 0.0;          // what the accelerometer feels of a push
+};
+
+template <class Filter, int Wheels>
+class SensorFaults {
+ public:
+  using Sample = Measurement<Wheels>;
+  using Model = typename Filter::Model;
+  using Input = Vec<Model::kInputs>;
+  static constexpr auto kHypotheses = fault_hypotheses<Wheels>();
+  static constexpr std::size_t kCount = kHypotheses.size();
+
+  /// `filter`: the control's; the evidence is weighed by the encoders' noise, not the one that its margins
+  /// ask for.
+  SensorFaults(const Filter& filter, const SensorFaultsParams& params)
+      : p_(params),
+        gross_(params.balances),
+        weigh_(params.evidence),
+        healthy_(with_noise(filter, params)),
+        before_(healthy_),
+        members_(filled(healthy_, std::make_index_sequence<kCount>())) {
+    Filter& pushed = members_[kCount - 2].filter;
+    Filter& shaken = members_[kCount - 1].filter;
+    static_assert(kHypotheses[kCount - 2].kind == FaultHypothesis::kPush);
+    static_assert(kHypotheses[kCount - 1].kind == FaultHypothesis::kNoise);
+    for (std::size_t i = 0; i < 3; ++i) shaken.set_row_noise(i, kNoise_rad_s * kNoise_rad_s);
+    for (std::size_t i = Evidence::kAccelRow; i < Evidence::kRows; ++i) {
+      shaken.set_row_noise(i, kNoise_m_s2 * kNoise_m_s2);
+      pushed.set_row_noise(i, pushed.row_noise(i) + params.push_m_s2 * params.push_m_s2);
+    }
+    reset(filter, 0.0);
+  }
+
+  /// Motors off: every sensor is used again. `rest_sigma_rad_s`: of the gyro, while the robot was at rest.
+  void reset(const Filter& control, double rest_sigma_rad_s) noexcept {
+    healthy_.adopt(control);
+    used_ = Used{};
+    gross_.reset();
+    weigh_.reset(rest_sigma_rad_s);
+    trusted_ = true;
+    ticks_ = jumps_ = 0;
+    stale_ = true;
+  }
+
+  /// One tick of `control`, which goes on without what is found faulty. `expected_rad_s`: rates of the body.
+  void step(Filter& control, const Input& u, const Sample& raw, const Vec3& expected_rad_s) noexcept {
+    ++ticks_;
+    const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
+    control.predict(u);
+    control.update(used_.of(z));
+    if (!raw.imu_ok || !raw.encoders_ok) {  // nothing to weigh against each other
+      healthy_.predict(u);
+      healthy_.update(used_.of(z));
+      weigh_.forget();
+      stale_ = true;
+      return;
+    }
+    if (stale_) begin_all();
+    advance_all(u, z);
+    weigh_.hear(z);
+    decide(control);
+  }
+
+  bool trusted() const noexcept { return trusted_ && gross_.trusted(); }
+  std::uint32_t excluded_wheels() const noexcept { return used_.without_wheels; }
+  bool gyro_axis_excluded() const noexcept { return used_.without_axes != 0 || gross_.frozen(); }
+  int bias_jumps() const noexcept { return jumps_; }
+  /// A fault leads: what surprises the control's filter is about to be explained.
+  bool suspects() const noexcept { return suspects_; }
+  /// An encoder was found so early that it has been faulty from the start, or the robot is put down badly.
+  bool while_arming() const noexcept { return used_.without_wheels != 0 && excluded_at_ <= kArmingTicks; }
+  bool stood_still() const noexcept { return stood_still_; }
+  /// Normalized innovation of every sensor that is used, by the evidence.
+  double surprise() const noexcept { return weigh_.surprise(); }
+  const Filter& healthy() const noexcept { return healthy_; }
+  double ratio(std::size_t hypothesis) const noexcept { return members_[hypothesis].ratio; }
+
+ private:
+  using Evidence = equipoise::Evidence<Filter, Wheels>;
+  using Used = UsedSensors<Wheels>;
+
+  // Decisions, in nats. A false alarm in ten hours of ticks and sixteen hypotheses: ln(7.2e6 * 16)
+  // (Lorden 1971).
+  static constexpr double kBound = 18.6;
+  static constexpr double kMargin = 5.0;  // odds of 150 to 1
+  static constexpr double kEventPrior =
+      9.0;  // nats: a push or slip a minute, a fault in 100 hours; wiring as much rarer
+  static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
+  static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
+  static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
+  static constexpr int kStillTicks = 4;     // of an encoder that stands
+  // Events and faults.
+  static constexpr double kPush_N = 1.0;           // of pushes of 0.5 to 4 N, one sigma in a tick
+  static constexpr double kNoise_rad_s = 0.15;     // of an IMU that shakes: real robots that roll reach 0.1
+  static constexpr double kNoise_m_s2 = 3.0;       // and 3
+  static constexpr double kSlip_rad = 0.01;        // in a tick: a ball that spins at 2 rad/s on a sill
+  static constexpr double kLeastJump_rad_s = 0.1;  // the filter's own bias learns less
+  static constexpr double kJump_rad_s = 0.3;
+  static constexpr double kBias_rad_s = 0.1;  // uncertain after a jump: the noise of one sample
+
+  struct Member {
+    Filter filter;
+    Used used{};
+    double ratio = 0.0;  // log-likelihood, of the hypothesis over what is used, since it was last refuted
+    int since = 0;       // tick
+    bool from_start = false;  // not refuted since arming
+    int returns = -1;         // row of an excluded sensor that may be healthy again
+    double from = 0.0;        // what that read when the member began
+  };
+
+  static Filter with_noise(Filter filter, const SensorFaultsParams& p) {
+    filter.let_encoders_slip(false);  // slipping is a hypothesis of its own
+    for (std::size_t i = Evidence::kWheelRow; i < Evidence::kAccelRow; ++i)
+      filter.set_row_noise(i, p.evidence.encoder_sigma_rad * p.evidence.encoder_sigma_rad);
+    return filter;
+  }
+  template <std::size_t... I>
+  static std::array<Member, kCount> filled(const Filter& filter, std::index_sequence<I...>) {
+    return {((void)I, Member{filter})...};
+  }
+
+  void begin_all() noexcept {
+    for (std::size_t i = 0; i < kCount; ++i) begin(i, healthy_);
+    stale_ = false;
+    suspects_ = false;
+    undecided_ = 0;
+  }
+
+  void begin(std::size_t i, const Filter& from) noexcept {
+    const FaultHypothesis& h = kHypotheses[i];
+    Member& m = members_[i];
+    m.filter.adopt(from);
+    m.used = used_.turned_over(h);
+    const bool wheel_returns = h.kind == FaultHypothesis::kWheel && (used_.without_wheels & h.mask) != 0;
+    if (wheel_returns && weigh_.known())
+      m.used.offset_rad(h.first()) =
+          before_.wheel_angle_rad()(h.first()) - weigh_.before().wheel_angle_rad(h.first());
+    if (m.used.reversed >= 0) m.used.mirror_rad = from.wheel_angle_rad()(m.used.reversed);
+    m.ratio = h.kind == FaultHypothesis::kBias ? -kMargin : 0.0;  // until it jumps
+    m.since = ticks_;
+    m.from_start = ticks_ <= kArmingTicks;
+    m.returns = -1;
+    if (wheel_returns) m.returns = Model::kWheel + h.first();
+    if (h.kind == FaultHypothesis::kAxis && (used_.without_axes & h.mask) != 0) m.returns = h.first();
+    if (m.returns >= 0) m.from = Evidence::reading(weigh_.before(), static_cast<std::size_t>(m.returns));
+  }
+
+  bool applies(const FaultHypothesis& h) const noexcept {
+    if (h.kind == FaultHypothesis::kAxis || h.kind == FaultHypothesis::kSwap) {
+      for (std::size_t i = 0; i < 3; ++i)
+        if (p_.evidence.idle[i] && (h.mask >> i & 1U) != 0) return false;
+    }
+    if (h.kind == FaultHypothesis::kWheel) return (used_.backwards & h.mask) == 0;
+    if (h.kind == FaultHypothesis::kSwap) return (used_.without_axes & h.mask) == 0;
+    const bool encoders = h.kind == FaultHypothesis::kReversed || h.kind == FaultHypothesis::kWheels;
+    return !encoders || (used_.without_wheels & h.mask) == 0;
+  }
+
+  void calm(Filter& filter) const noexcept {
+    if (p_.calm_N > 0.0) filter.allow_push(p_.calm_N);
+  }
+
+  void advance_all(const Input& u, const Sample& z) noexcept {
+    before_.adopt(healthy_);
+    healthy_.predict(u);
+    calm(healthy_);
+    const Sample used = used_.of(z);
+    healthy_.update(used);
+    const double as_used = weigh_.expect(healthy_, used, z);
+    std::array<double, 3> least;
+    for (std::size_t row = 0; row < 3; ++row) least[row] = Evidence::squared(healthy_, row);
+    for (std::size_t i = 0; i < kCount; ++i) {
+      if (!applies(kHypotheses[i])) continue;
+      advance(i, u, z, as_used);
+      const Member& m = members_[i];
+      if (kHypotheses[i].kind == FaultHypothesis::kBias || m.used.swapped != 0)
+        continue;  // they fit anything
+      for (std::size_t row = 0; row < 3; ++row)
+        if (Evidence::comes(m.used.of(z), row))
+          least[row] = std::min(least[row], Evidence::squared(m.filter, row));
+    }
+    weigh_.learn_vibration(healthy_, used, least);
+  }
+
+  void advance(std::size_t i, const Input& u, const Sample& z, double as_used) noexcept {
+    const FaultHypothesis& h = kHypotheses[i];
+    Member& m = members_[i];
+    if (h.kind == FaultHypothesis::kBias) {
+      const double jump = jump_explains(z);
+      if (jump > 0.0 && jump >= m.ratio) return jumped(i, u, z, jump);
+      if (m.ratio <= -kMargin) return;
+    } else if (m.ratio <= -kMargin || (h.healthy() && ticks_ - m.since > kEventTicks)) {
+      begin(i, before_);
+    }
+    m.filter.predict(u);
+    if (h.kind == FaultHypothesis::kPush)
+      m.filter.allow_push(kPush_N);
+    else
+      calm(m.filter);
+    if (h.kind == FaultHypothesis::kSpin) m.filter.allow_spin(kSlip_rad);
+    if (h.kind == FaultHypothesis::kSlip) m.filter.allow_slip(kSlip_rad);
+    const Sample used = m.used.of(z);
+    m.filter.update(used);
+    double gain = weigh_(m.filter, used, z) - as_used;
+    if (m.returns >= 0) gain = std::min(gain, unless_faulty(m, z));
+    m.ratio = std::max(m.ratio + gain, -kMargin);
+    if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < kLeastJump_rad_s) m.ratio = -kMargin;
+  }
+
+  /// Of the gyro's bias, on the axis that it has moved most. What is smaller the filter's own bias learns:
+  /// the hypothesis would live on the freedom to do so.
+  double jump_rad_s(const Member& m) const noexcept {
+    Vec3 d = m.used.bias_rad_s - used_.bias_rad_s;
+    for (int k = 0; k < Filter::kBiases; ++k) d(k) += m.filter.gyro_bias(k) - healthy_.gyro_bias(k);
+    return d.cwiseAbs().maxCoeff();
+  }
+
+  /// Had the gyro's bias jumped just now, what would that explain? (Willsky and Jones 1976)
+  double jump_explains(const Sample& z) const noexcept {
+    double sum = 0.0;
+    double most = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!p_.jumps[i] || p_.evidence.idle[i] || !Evidence::comes(used_.of(z), i)) continue;
+      const double variance = weigh_.spread(healthy_, i);
+      sum += 0.5 * Evidence::squared(healthy_, i) *
+             (1.0 / variance - 1.0 / (variance + kJump_rad_s * kJump_rad_s));
+      most = std::max(most, std::abs(healthy_.row_innovation()[i]));
+    }
+    return most > kLeastJump_rad_s ? std::min(sum, Evidence::kOutlier) : 0.0;
+  }
+  void jumped(std::size_t i, const Input& u, const Sample& z, double ratio) noexcept {
+    begin(i, before_);
+    Member& m = members_[i];
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (p_.jumps[k] && Evidence::comes(used_.of(z), k))
+        m.used.bias_rad_s(static_cast<int>(k)) += healthy_.row_innovation()[k];
+    }
+    m.filter.doubt_bias(kBias_rad_s);
+    m.filter.predict(u);
+    calm(m.filter);
+    m.filter.update(m.used.of(z));
+    m.ratio = ratio;
+  }
+
+  /// A sensor that stands still or counts backwards may look healthy, too, while nothing moves much.
+  double unless_faulty(const Member& m, const Sample& z) const noexcept {
+    const auto row = static_cast<std::size_t>(m.returns);
+    if (!Evidence::comes(m.used.of(z), row)) return 0.0;
+    const double innovation = m.filter.row_innovation()[row];
+    const double reads = Evidence::reading(z, row);
+    const double moved = reads - m.from;
+    const double backwards = 2.0 * (row < 3 ? reads : moved) - innovation;
+    const double faulty = std::min(moved * moved, backwards * backwards);
+    return 0.5 * (faulty - innovation * innovation) / weigh_.spread(m.filter, row);
+  }
+
+  enum Consequence { kNone = -1, kStop = -2 };  // else the hypothesis' own
+  int consequence(std::size_t i) const noexcept {
+    const FaultHypothesis& h = kHypotheses[i];
+    if (h.healthy()) return kNone;
+    const bool falls = h.kind == FaultHypothesis::kAxis && p_.balances[static_cast<std::size_t>(h.first())] &&
+                       (used_.without_axes & h.mask) == 0;
+    if (h.kind == FaultHypothesis::kImu || h.kind == FaultHypothesis::kSwap || falls) return kStop;
+    if (h.kind == FaultHypothesis::kReversed) return h.first();  // as kWheel
+    return static_cast<int>(i);
+  }
+  /// Whatever is read wrongly could as well be left out.
+  bool left_out_explains(const FaultHypothesis& wiring) const noexcept {
+    const auto out = wiring.kind == FaultHypothesis::kSwap ? FaultHypothesis::kAxis : FaultHypothesis::kWheel;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      const bool its = kHypotheses[i].kind == out && (kHypotheses[i].mask & wiring.mask) != 0;
+      if (its && members_[i].ratio > 0.0) return true;
+    }
+    return false;
+  }
+  double weighed(std::size_t i) const noexcept {
+    const FaultHypothesis& h = kHypotheses[i];
+    if (!applies(h)) return -kMargin;
+    if (h.wiring() && !members_[i].from_start && !left_out_explains(h)) return -kMargin;
+    return members_[i].ratio + (h.healthy() ? kEventPrior : h.wiring() ? -kEventPrior : 0.0);
+  }
+
+  void decide(Filter& control) noexcept {
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < kCount; ++i) best = weighed(i) > weighed(best) ? i : best;
+    const int leads = consequence(best);
+    suspects_ = leads != kNone && weighed(best) > kMargin;
+    if (!(weighed(best) > kBound)) {
+      undecided_ = 0;
+      return;
+    }
+    if (leads == kNone) return happened(best, control);
+    double second = 0.0;
+    std::size_t runner_up = best;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      if (consequence(i) == leads || !(weighed(i) > second)) continue;
+      second = weighed(i);
+      runner_up = i;
+    }
+    // One encoder or two? What holds for two had better not be taken for one.
+    const bool nested = kHypotheses[runner_up].kind == FaultHypothesis::kWheels;
+    if (weighed(best) - second < (nested ? 2.0 : 1.0) * kMargin) {
+      if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) trusted_ = false;
+      return;
+    }
+    if (leads == kStop) {
+      trusted_ = false;
+      return;
+    }
+    use(best);
+    control.adopt(healthy_);
+  }
+
+  /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
+  /// The control's filter takes a push by its own input noise; it knows of no noisier samples.
+  void happened(std::size_t event, Filter& control) noexcept {
+    healthy_.adopt(members_[event].filter);
+    if (kHypotheses[event].kind != FaultHypothesis::kPush) control.adopt(healthy_);
+    const double ratio = members_[event].ratio;
+    for (Member& m : members_) m.ratio = std::max(m.ratio - ratio, -kMargin);
+    begin(event, healthy_);
+    undecided_ = 0;
+  }
+
+  void use(std::size_t hypothesis) noexcept {
+    const FaultHypothesis& h = kHypotheses[hypothesis];
+    const Member& m = members_[hypothesis];
+    const bool reversed = h.kind == FaultHypothesis::kReversed;
+    const std::uint32_t without = reversed ? used_.without_wheels | h.mask : m.used.without_wheels;
+    if ((without & ~used_.without_wheels) != 0) {
+      excluded_at_ = ticks_;
+      stood_still_ = !reversed && weigh_.still(static_cast<std::size_t>(h.first())) >= kStillTicks;
+    }
+    if (!reversed) used_ = m.used;
+    if (reversed) used_.backwards |= h.mask;
+    used_.without_wheels = without;
+    healthy_.adopt(m.filter);
+    if (h.kind == FaultHypothesis::kBias) ++jumps_;
+    begin_all();
+  }
+
+  SensorFaultsParams p_;
+  GrossSamples gross_;
+  Evidence weigh_;
+  Filter healthy_;  // with everything that is used
+  Filter before_;   // a tick ago
+  std::array<Member, kCount> members_;
+  Used used_;
+  bool stale_ = true;  // members have missed a tick
+  bool trusted_ = true;
+  bool suspects_ = false;
+  bool stood_still_ = false;  // the encoder that was excluded last
+  int ticks_ = 0;             // since arming
+  int excluded_at_ = 0;
+  int jumps_ = 0;
+  int undecided_ = 0;
+};
+
+template <class Filter, int Wheels>
+void report(const SensorFaults<Filter, Wheels>& faults, EstimatorHealth<Wheels>* health) noexcept {
+  const std::uint32_t wheels = faults.excluded_wheels();
+  health->lost = wheels;
+  health->dead = (wheels & (wheels - 1)) != 0 ? wheels : 0;
+  health->stood_still = faults.stood_still();
+  health->while_arming = faults.while_arming();
+  health->checking = faults.suspects();
+  health->gyro_left_out = faults.gyro_axis_excluded();
+  health->gyro_bias_jumped = faults.bias_jumps() > 0;
+  health->gyro_trusted = faults.trusted();
+}
+
+}  // namespace equipoise

@@ -1,0 +1,54 @@
+// Which sensors of a robot are used, and how what they say is read. In: Measurement -> out: the same without
+// what is faulty. Plain values, RT-safe.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+
+#include "equipoise/estimate/fault_hypotheses.hpp"
+#include "equipoise/samples.hpp"
+
+namespace equipoise {
+
+/// Which samples are used, and how they are read.
+template <int Wheels>
+struct UsedSensors {
+  std::uint32_t without_wheels = 0;  // bits
+  std::uint32_t backwards = 0;       // of these: wiring, they do not return
+  std::uint32_t without_axes = 0;    // of the gyro
+  std::uint32_t swapped = 0;         // two axes of it
+  int reversed = -1;                 // a wheel that counts backwards
+  double mirror_rad = 0.0;           // since it stood there
+  bool imu = true;
+  Vec3 bias_rad_s = Vec3::Zero();                // of the gyro, since it jumped
+  Vec<Wheels> offset_rad = Vec<Wheels>::Zero();  // of encoders that came back
+  Measurement<Wheels> of(const Measurement<Wheels>& z) const noexcept {
+    Measurement<Wheels> s = z;
+    s.imu_ok = z.imu_ok && imu;
+    s.gyro_B_rad_s -= bias_rad_s;
+    s.wheel_angle_rad += offset_rad;
+    if (reversed >= 0) s.wheel_angle_rad(reversed) = 2.0 * mirror_rad - s.wheel_angle_rad(reversed);
+    if (swapped == 0b011) std::swap(s.gyro_B_rad_s.x(), s.gyro_B_rad_s.y());
+    if (swapped == 0b110) std::swap(s.gyro_B_rad_s.y(), s.gyro_B_rad_s.z());
+    if (swapped == 0b101) std::swap(s.gyro_B_rad_s.z(), s.gyro_B_rad_s.x());
+    for (std::size_t i = 0; i < 3; ++i)
+      s.gyro_axis_ok[i] = z.gyro_axis_ok[i] && (without_axes >> i & 1U) == 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(Wheels); ++i)
+      s.wheel_ok[i] = z.wheel_ok[i] && (without_wheels >> i & 1U) == 0;
+    return s;
+  }
+
+  /// A hypothesis turns over what is used of its sensors: an excluded one may be healthy again.
+  UsedSensors turned_over(const FaultHypothesis& h) const noexcept {
+    UsedSensors u = *this;
+    if (h.kind == FaultHypothesis::kWheel) u.without_wheels ^= h.mask;
+    if (h.kind == FaultHypothesis::kWheels) u.without_wheels |= h.mask;
+    if (h.kind == FaultHypothesis::kReversed) u.reversed = h.first();
+    if (h.kind == FaultHypothesis::kAxis) u.without_axes ^= h.mask;
+    if (h.kind == FaultHypothesis::kSwap) u.swapped = h.mask;
+    if (h.kind == FaultHypothesis::kImu) u.imu = false;
+    return u;
+  }
+};
+
+}  // namespace equipoise

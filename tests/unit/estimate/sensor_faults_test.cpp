@@ -1,0 +1,223 @@
+// The parts of the fault detector alone, and its rate of false alarms on a robot whose noise is what it takes
+// it for. Robots with faults: tests/scenario.
+#include "equipoise/estimate/sensor_faults.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "robots/mbbr/config.hpp"
+#include "robots/mbbr/ekf.hpp"
+
+namespace equipoise {
+namespace {
+
+using Sample = Mbbr::Sample;
+using Detector = SensorFaults<MbbrEkf, 3>;
+
+Sample at_rest() {
+  Sample z;
+  z.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
+  z.wheel_angle_rad = Vec3(1.0, 2.0, 3.0);
+  z.gyro_B_rad_s = Vec3(0.1, 0.2, 0.3);
+  z.imu_ok = z.encoders_ok = true;
+  return z;
+}
+
+TEST(FaultHypotheses, EveryEncoderPairAndAxisHasItsOwn) {
+  constexpr auto three = fault_hypotheses<3>();
+  int kinds[FaultHypothesis::kNoise + 1] = {};
+  for (const FaultHypothesis& h : three) ++kinds[h.kind];
+  EXPECT_EQ(kinds[FaultHypothesis::kWheel], 3);
+  EXPECT_EQ(kinds[FaultHypothesis::kReversed], 3);
+  EXPECT_EQ(kinds[FaultHypothesis::kWheels], 3);
+  EXPECT_EQ(kinds[FaultHypothesis::kAxis], 3);
+  EXPECT_EQ(kinds[FaultHypothesis::kSwap], 3);
+  for (int kind = FaultHypothesis::kBias; kind <= FaultHypothesis::kNoise; ++kind) EXPECT_EQ(kinds[kind], 1);
+  EXPECT_EQ(fault_hypotheses<2>().size(), 2U + 2U + 1U + 3U + 3U + 6U);
+}
+
+TEST(UsedSensors, ReadWhatIsWrongTheOtherWayRound) {
+  const Sample z = at_rest();
+  UsedSensors<3> used;
+  EXPECT_EQ(used.of(z).gyro_B_rad_s, z.gyro_B_rad_s);
+  used = UsedSensors<3>{}.turned_over({FaultHypothesis::kSwap, 0b110});
+  EXPECT_EQ(used.of(z).gyro_B_rad_s, Vec3(0.1, 0.3, 0.2));
+  used = UsedSensors<3>{}.turned_over({FaultHypothesis::kSwap, 0b101});
+  EXPECT_EQ(used.of(z).gyro_B_rad_s, Vec3(0.3, 0.2, 0.1));
+  used = UsedSensors<3>{}.turned_over({FaultHypothesis::kReversed, 0b010});
+  used.mirror_rad = 1.5;
+  EXPECT_EQ(used.of(z).wheel_angle_rad, Vec3(1.0, 1.0, 3.0));
+  used = UsedSensors<3>{}.turned_over({FaultHypothesis::kWheels, 0b101});
+  EXPECT_FALSE(used.of(z).wheel_ok[0]);
+  EXPECT_TRUE(used.of(z).wheel_ok[1]);
+  EXPECT_FALSE(used.of(z).wheel_ok[2]);
+  used = UsedSensors<3>{}.turned_over({FaultHypothesis::kImu, 0});
+  EXPECT_FALSE(used.of(z).imu_ok);
+}
+
+TEST(UsedSensors, AnExcludedSensorMayReturn) {
+  const FaultHypothesis wheel{FaultHypothesis::kWheel, 0b100};
+  const UsedSensors<3> without = UsedSensors<3>{}.turned_over(wheel);
+  EXPECT_FALSE(without.of(at_rest()).wheel_ok[2]);
+  EXPECT_TRUE(without.turned_over(wheel).of(at_rest()).wheel_ok[2]);
+}
+
+TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
+  GrossSamples gross({true, true, false});
+  const Sample z = at_rest();
+  Sample odd = z;
+  odd.gyro_B_rad_s.z() += 3.1;
+  EXPECT_TRUE(gross.without(z, z.gyro_B_rad_s).imu_ok);
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(gross.without(odd, z.gyro_B_rad_s).imu_ok);
+  EXPECT_TRUE(gross.without(odd, z.gyro_B_rad_s).imu_ok);
+  EXPECT_TRUE(gross.trusted()) << "the robot balances without its z axis";
+  odd.gyro_B_rad_s.x() += 3.1;
+  gross.without(odd, z.gyro_B_rad_s);
+  EXPECT_FALSE(gross.trusted());
+}
+
+TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
+  GrossSamples gross({true, true, false});
+  Sample z = at_rest();
+  z.gyro_axis_ok[1] = false;
+  for (int i = 0; i < 10; ++i) gross.without(z, z.gyro_B_rad_s + Vec3(0.0, 0.04, 0.0));
+  EXPECT_FALSE(gross.frozen());
+  for (int i = 0; i < 5; ++i) gross.without(z, z.gyro_B_rad_s + Vec3(0.0, 0.06, 0.0));
+  EXPECT_TRUE(gross.frozen());
+  EXPECT_FALSE(gross.trusted());
+}
+
+/// A filter whose innovations are told.
+struct Told {
+  struct Model {
+    static constexpr int kOutputs = 8, kWheel = 3;
+  };
+  std::array<double, 8> innovation{}, variance{};
+  const std::array<double, 8>& row_innovation() const { return innovation; }
+  const std::array<double, 8>& row_variance() const { return variance; }
+};
+
+TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
+  using TheEvidence = Evidence<Told, 3>;
+  TheEvidence evidence(EvidenceParams{{}, 0.01, 0.2});
+  evidence.reset(0.0);
+  Told filter;
+  filter.variance.fill(1e-4);
+  const Sample z = at_rest();
+  const double as_expected = evidence.expect(filter, z, z);
+  // The model's error of two sigma: 0.5 of a squared normal number in place of four.
+  filter.innovation[3] = 0.02;
+  EXPECT_NEAR(as_expected - evidence(filter, z, z), 0.5, 1e-4);
+  filter.innovation[3] = 10.0;
+  EXPECT_NEAR(as_expected - evidence(filter, z, z), TheEvidence::kOutlier, 1e-3);
+  filter.innovation[3] = NAN;
+  EXPECT_NEAR(as_expected - evidence(filter, z, z), TheEvidence::kOutlier, 1e-3);
+}
+
+TEST(Evidence, AGyroThatShakesIsBelievedLess) {
+  using TheEvidence = Evidence<Told, 3>;
+  TheEvidence evidence(EvidenceParams{{}, 0.01, 0.2});
+  evidence.reset(0.001);
+  std::mt19937 random(1);
+  std::normal_distribution<double> shakes(0.0, 0.05);
+  Told filter;
+  filter.variance.fill(1e-6);
+  for (int i = 0; i < 4000; ++i) {
+    std::array<double, 3> squared{};
+    for (double& s : squared) s = std::pow(shakes(random), 2);
+    evidence.learn_vibration(filter, at_rest(), squared);
+  }
+  EXPECT_NEAR(std::sqrt(evidence.spread(filter, 0)) / 2.0, 0.05, 0.015);
+  EXPECT_NEAR(std::sqrt(evidence.spread(filter, 4)) / 2.0, 0.001, 1e-6) << "an encoder does not shake";
+}
+
+class Standing : public testing::Test {
+ protected:
+  MbbrConfig config = load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", {}).config;
+  MbbrEkf control{config.robot, config.estimators.ekf};
+  std::mt19937 random{7};
+  std::normal_distribution<double> normal;
+  double gyro_sigma_rad_s = 0.0015;
+
+  static SensorFaultsParams params() {
+    SensorFaultsParams p;
+    p.evidence = {{}, 0.012, 0.15};
+    p.balances = p.jumps = {true, true, false};
+    return p;
+  }
+  Sample sample() {
+    Sample z = at_rest();
+    z.gyro_B_rad_s = gyro_sigma_rad_s * Vec3(normal(random), normal(random), normal(random));
+    z.accel_B_m_s2 += 0.05 * Vec3(normal(random), normal(random), normal(random));
+    return z;
+  }
+  Detector armed() {
+    control.start(Vec2::Zero(), Vec3::Zero(), at_rest().wheel_angle_rad);
+    Detector detector(control, params());
+    detector.reset(control, gyro_sigma_rad_s);
+    return detector;
+  }
+};
+
+/// A ratio of likelihoods exceeds e^h with a chance of e^-h at most, whatever the model (Ville 1939); its sum
+/// since it was last refuted starts anew at most every tick.
+TEST_F(Standing, RatiosOfAHealthyRobotAreRarerThanTheoryAllows) {
+  Detector detector = armed();
+  constexpr int kTicks = 6000;
+  std::array<int, 3> beyond{};  // 4, 8, 12 nats
+  for (int tick = 0; tick < kTicks; ++tick) {
+    detector.step(control, Vec3::Zero(), sample(), Vec3::Zero());
+    double most = 0.0;
+    for (std::size_t i = 0; i < Detector::kCount; ++i)
+      if (!Detector::kHypotheses[i].healthy()) most = std::max(most, detector.ratio(i));
+    for (std::size_t i = 0; i < 3; ++i) beyond[i] += most > 4.0 * static_cast<double>(i + 1);
+  }
+  EXPECT_TRUE(detector.trusted());
+  EXPECT_EQ(detector.excluded_wheels(), 0U);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_LE(beyond[i],
+              kTicks * static_cast<double>(Detector::kCount) * std::exp(-4.0 * static_cast<double>(i + 1)));
+}
+
+TEST_F(Standing, NoiseThatGrowsIsNoFault) {
+  Detector detector = armed();
+  for (int tick = 0; tick < 2000; ++tick) {
+    gyro_sigma_rad_s = tick < 400 ? 0.0015 : 0.1;
+    detector.step(control, Vec3::Zero(), sample(), Vec3::Zero());
+  }
+  EXPECT_TRUE(detector.trusted());
+  EXPECT_FALSE(detector.gyro_axis_excluded());
+  EXPECT_EQ(detector.bias_jumps(), 0);
+}
+
+TEST_F(Standing, ABiasThatJumpsIsTakenOff) {
+  Detector detector = armed();
+  int found = 0;
+  for (int tick = 0; tick < 600; ++tick) {
+    Sample z = sample();
+    if (tick >= 400) z.gyro_B_rad_s += Vec3(0.3, -0.25, 0.0);
+    detector.step(control, Vec3::Zero(), z, Vec3::Zero());
+    if (detector.bias_jumps() > 0 && found == 0) found = tick;
+  }
+  EXPECT_GE(found, 400);
+  EXPECT_LE(found, 440) << "0.2 s: 0.3 rad/s make 0.06 rad of it";
+  EXPECT_TRUE(detector.trusted());
+  EXPECT_LT(control.estimate().omega_B.norm(), 0.05);
+}
+
+TEST_F(Standing, NothingIsWeighedWithoutOneKindOfSensor) {
+  Detector detector = armed();
+  for (int tick = 0; tick < 600; ++tick) {
+    Sample z = sample();
+    z.imu_ok = tick < 400;
+    if (tick >= 400) z.wheel_angle_rad += 0.02 * (tick - 400) * Vec3(1.0, 1.0, 1.0);
+    detector.step(control, Vec3::Zero(), z, Vec3::Zero());
+  }
+  EXPECT_TRUE(detector.trusted());
+  EXPECT_EQ(detector.excluded_wheels(), 0U);
+}
+
+}  // namespace
+}  // namespace equipoise
