@@ -107,8 +107,9 @@ def machine_counts(root, request):
 def test_a_tick_costs_a_share_of_one_with_the_dense_filter(machine_counts, robot):
     counts, share = machine_counts[robot], machine_counts["share"]
     assert counts["tick"] <= share * counts["dense_tick"]
-    quiet = counts["tick_of_one_filter"]
-    assert quiet <= share * (quiet - counts["filter"] + counts["dense_filter"]), "without the bank, too"
+    if counts["filters"] == 1.0:  # where the bank always runs there is no tick without it
+        quiet = counts["tick_of_one_filter"]
+        assert quiet <= share * (quiet - counts["filter"] + counts["dense_filter"])
     assert counts["filter"] <= 0.75 * share * counts["dense_filter"]
 
 

@@ -17,7 +17,7 @@ template <int Wheels, class Filter, class Counts>
 bool widen_by_slip(Filter& filter, int first_row, int first_state, const Counts& counts) noexcept {
   bool slipped = false;
   for (int i = 0; i < Wheels; ++i) {
-    const auto row = static_cast<std::size_t>(first_row + i);
+    const auto row = static_cast<std::size_t>(first_row) + static_cast<std::size_t>(i);
     const double beyond = (filter.row_nis()[row] - 1.0) * filter.row_variance()[row];
     if (!(beyond > 0.0)) continue;  // unused, as expected, or not a number
     filter.widen(first_state, counts(Vec<Wheels>::Unit(i)), beyond);
