@@ -12,7 +12,6 @@
 namespace equipoise {
 
 struct EvidenceParams {
-  std::array<bool, 3> idle{};      // gyro axes that a rough floor turns: they are no evidence
   double encoder_sigma_rad = 0.0;  // counts and play
   double wheel_step_rad = 0.0;     // that a wheel turns in a tick, at most
 };
@@ -32,7 +31,6 @@ class Evidence {
   void reset(double sigma_rad_s) noexcept {
     const double sigma = std::min(sigma_rad_s, kMostVibration_rad_s);
     vibration_ = sigma * sigma;
-    surprise_ = 0.0;
     still_.fill(0);
     forget();
   }
@@ -41,10 +39,10 @@ class Evidence {
 
   /// A tick's first: what is expected of the others, and its own.
   double expect(const Filter& f, const Sample& used, const Sample& came) noexcept {
+    for (std::size_t row = 0; row < kRows; ++row) faulty_[row] = log_faulty(row, came);
     double misfit = 0.0;
     const double density = log_density(f, used, came, &misfit);
     expected_ = density + misfit;
-    surprise_ = 2.0 * misfit / static_cast<double>(kRows);
     return bounded(density);
   }
   double operator()(const Filter& f, const Sample& used, const Sample& came) const noexcept {
@@ -74,8 +72,6 @@ class Evidence {
   const Sample& before() const noexcept { return before_; }
   /// Ticks since an encoder has counted.
   int still(std::size_t wheel) const noexcept { return still_[wheel]; }
-  /// Mean of the rows' squared innovations over what is expected of them, in what is used.
-  double surprise() const noexcept { return surprise_; }
 
   /// Variance of an innovation: what the filter expects, at least what vibrates, and the model's error.
   double spread(const Filter& f, std::size_t row) const noexcept {
@@ -114,10 +110,9 @@ class Evidence {
   double log_density(const Filter& f, const Sample& used, const Sample& came, double* misfit) const noexcept {
     double sum = 0.0;
     for (std::size_t row = 0; row < kRows; ++row) {
-      if (!comes(came, row) || (row < 3 && p_.idle[row])) continue;
-      const double faulty = log_faulty(row, came);
+      if (!comes(came, row)) continue;
       if (!comes(used, row)) {
-        sum += faulty;
+        sum += faulty_[row];
         continue;
       }
       const double variance = spread(f, row);
@@ -125,7 +120,7 @@ class Evidence {
       double density = peak - 0.5 * squared(f, row) / variance;
       if (!(density > -1e6)) return -1e6;  // the filter has diverged
       const bool imu = row < 3 || row >= kAccelRow;
-      if (imu) density = std::max(density, faulty + std::log(kShaken));
+      if (imu) density = std::max(density, faulty_[row] + std::log(kShaken));
       sum += density;
       *misfit += peak - density;
     }
@@ -146,10 +141,10 @@ class Evidence {
   }
 
   EvidenceParams p_;
-  double vibration_ = 0.0;  // variance of the gyro
-  double expected_ = 0.0;   // log density of what is expected
-  double surprise_ = 0.0;
-  Sample before_;  // a tick ago
+  double vibration_ = 0.0;              // variance of the gyro
+  double expected_ = 0.0;               // log density of what is expected
+  std::array<double, kRows> faulty_{};  // log densities, of this tick
+  Sample before_;                       // a tick ago
   bool known_ = false;
   std::array<int, static_cast<std::size_t>(Wheels)> still_{};
 };

@@ -24,9 +24,6 @@ namespace equipoise {
 struct SensorFaultsParams {
   EvidenceParams evidence;
   std::array<bool, 3> balances{};  // gyro axes without which the robot falls
-  std::array<bool, 3> jumps{};     // whose bias jumps, together
-  double calm_N = 0.0;             // that pushes a robot always: a slope, a cable
-  double push_m_s2 = 0.0;          // what the accelerometer feels of a push
 };
 
 template <class Filter, int Wheels>
@@ -47,15 +44,11 @@ class SensorFaults {
         healthy_(with_noise(filter, params)),
         before_(healthy_),
         members_(filled(healthy_, std::make_index_sequence<kCount>())) {
-    Filter& pushed = members_[kCount - 2].filter;
     Filter& shaken = members_[kCount - 1].filter;
-    static_assert(kHypotheses[kCount - 2].kind == FaultHypothesis::kPush);
     static_assert(kHypotheses[kCount - 1].kind == FaultHypothesis::kNoise);
     for (std::size_t i = 0; i < 3; ++i) shaken.set_row_noise(i, kNoise_rad_s * kNoise_rad_s);
-    for (std::size_t i = Evidence::kAccelRow; i < Evidence::kRows; ++i) {
+    for (std::size_t i = Evidence::kAccelRow; i < Evidence::kRows; ++i)
       shaken.set_row_noise(i, kNoise_m_s2 * kNoise_m_s2);
-      pushed.set_row_noise(i, pushed.row_noise(i) + params.push_m_s2 * params.push_m_s2);
-    }
     reset(filter, 0.0);
   }
 
@@ -98,9 +91,6 @@ class SensorFaults {
   /// An encoder was found so early that it has been faulty from the start, or the robot is put down badly.
   bool while_arming() const noexcept { return used_.without_wheels != 0 && excluded_at_ <= kArmingTicks; }
   bool stood_still() const noexcept { return stood_still_; }
-  /// Normalized innovation of every sensor that is used, by the evidence.
-  double surprise() const noexcept { return weigh_.surprise(); }
-  const Filter& healthy() const noexcept { return healthy_; }
   double ratio(std::size_t hypothesis) const noexcept { return members_[hypothesis].ratio; }
 
  private:
@@ -111,8 +101,8 @@ class SensorFaults {
   // (Lorden 1971).
   static constexpr double kBound = 18.6;
   static constexpr double kMargin = 5.0;  // odds of 150 to 1
-  static constexpr double kEventPrior =
-      9.0;  // nats: a push or slip a minute, a fault in 100 hours; wiring as much rarer
+  // A push or slip a minute, a fault in 100 hours; wiring is as much rarer again.
+  static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
@@ -174,24 +164,15 @@ class SensorFaults {
   }
 
   bool applies(const FaultHypothesis& h) const noexcept {
-    if (h.kind == FaultHypothesis::kAxis || h.kind == FaultHypothesis::kSwap) {
-      for (std::size_t i = 0; i < 3; ++i)
-        if (p_.evidence.idle[i] && (h.mask >> i & 1U) != 0) return false;
-    }
     if (h.kind == FaultHypothesis::kWheel) return (used_.backwards & h.mask) == 0;
     if (h.kind == FaultHypothesis::kSwap) return (used_.without_axes & h.mask) == 0;
     const bool encoders = h.kind == FaultHypothesis::kReversed || h.kind == FaultHypothesis::kWheels;
     return !encoders || (used_.without_wheels & h.mask) == 0;
   }
 
-  void calm(Filter& filter) const noexcept {
-    if (p_.calm_N > 0.0) filter.allow_push(p_.calm_N);
-  }
-
   void advance_all(const Input& u, const Sample& z) noexcept {
     before_.adopt(healthy_);
     healthy_.predict(u);
-    calm(healthy_);
     const Sample used = used_.of(z);
     healthy_.update(used);
     const double as_used = weigh_.expect(healthy_, used, z);
@@ -201,11 +182,11 @@ class SensorFaults {
       if (!applies(kHypotheses[i])) continue;
       advance(i, u, z, as_used);
       const Member& m = members_[i];
-      if (kHypotheses[i].kind == FaultHypothesis::kBias || m.used.swapped != 0)
-        continue;  // they fit anything
+      // What fits anything tells no vibration.
+      if (kHypotheses[i].kind == FaultHypothesis::kBias || m.used.swapped != 0) continue;
+      const Sample seen = m.used.of(z);
       for (std::size_t row = 0; row < 3; ++row)
-        if (Evidence::comes(m.used.of(z), row))
-          least[row] = std::min(least[row], Evidence::squared(m.filter, row));
+        if (Evidence::comes(seen, row)) least[row] = std::min(least[row], Evidence::squared(m.filter, row));
     }
     weigh_.learn_vibration(healthy_, used, least);
   }
@@ -221,10 +202,7 @@ class SensorFaults {
       begin(i, before_);
     }
     m.filter.predict(u);
-    if (h.kind == FaultHypothesis::kPush)
-      m.filter.allow_push(kPush_N);
-    else
-      calm(m.filter);
+    if (h.kind == FaultHypothesis::kPush) m.filter.allow_push(kPush_N);
     if (h.kind == FaultHypothesis::kSpin) m.filter.allow_spin(kSlip_rad);
     if (h.kind == FaultHypothesis::kSlip) m.filter.allow_slip(kSlip_rad);
     const Sample used = m.used.of(z);
@@ -247,8 +225,9 @@ class SensorFaults {
   double jump_explains(const Sample& z) const noexcept {
     double sum = 0.0;
     double most = 0.0;
+    const Sample used = used_.of(z);
     for (std::size_t i = 0; i < 3; ++i) {
-      if (!p_.jumps[i] || p_.evidence.idle[i] || !Evidence::comes(used_.of(z), i)) continue;
+      if (!p_.balances[i] || !Evidence::comes(used, i)) continue;
       const double variance = weigh_.spread(healthy_, i);
       sum += 0.5 * Evidence::squared(healthy_, i) *
              (1.0 / variance - 1.0 / (variance + kJump_rad_s * kJump_rad_s));
@@ -259,13 +238,13 @@ class SensorFaults {
   void jumped(std::size_t i, const Input& u, const Sample& z, double ratio) noexcept {
     begin(i, before_);
     Member& m = members_[i];
+    const Sample used = used_.of(z);
     for (std::size_t k = 0; k < 3; ++k) {
-      if (p_.jumps[k] && Evidence::comes(used_.of(z), k))
+      if (p_.balances[k] && Evidence::comes(used, k))
         m.used.bias_rad_s(static_cast<int>(k)) += healthy_.row_innovation()[k];
     }
     m.filter.doubt_bias(kBias_rad_s);
     m.filter.predict(u);
-    calm(m.filter);
     m.filter.update(m.used.of(z));
     m.ratio = ratio;
   }
@@ -309,11 +288,13 @@ class SensorFaults {
   }
 
   void decide(Filter& control) noexcept {
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < kCount; ++i) best = weighed(i) > weighed(best) ? i : best;
+    std::array<double, kCount> weight;
+    for (std::size_t i = 0; i < kCount; ++i) weight[i] = weighed(i);
+    const auto best =
+        static_cast<std::size_t>(std::max_element(weight.begin(), weight.end()) - weight.begin());
     const int leads = consequence(best);
-    suspects_ = leads != kNone && weighed(best) > kMargin;
-    if (!(weighed(best) > kBound)) {
+    suspects_ = leads != kNone && weight[best] > kMargin;
+    if (!(weight[best] > kBound)) {
       undecided_ = 0;
       return;
     }
@@ -321,13 +302,13 @@ class SensorFaults {
     double second = 0.0;
     std::size_t runner_up = best;
     for (std::size_t i = 0; i < kCount; ++i) {
-      if (consequence(i) == leads || !(weighed(i) > second)) continue;
-      second = weighed(i);
+      if (consequence(i) == leads || !(weight[i] > second)) continue;
+      second = weight[i];
       runner_up = i;
     }
     // One encoder or two? What holds for two had better not be taken for one.
     const bool nested = kHypotheses[runner_up].kind == FaultHypothesis::kWheels;
-    if (weighed(best) - second < (nested ? 2.0 : 1.0) * kMargin) {
+    if (weight[best] - second < (nested ? 2.0 : 1.0) * kMargin) {
       if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) trusted_ = false;
       return;
     }

@@ -22,7 +22,7 @@ void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
 SensorFaultsParams sensor_faults(const MbbrParameters& robot) {
   const double no_load_rad_s = robot.k1 / robot.k2_ball * robot.r / robot.r_w;
   SensorFaultsParams p;
-  p.balances = p.jumps = {true, true, false};
+  p.balances = {true, true, false};
   p.evidence.encoder_sigma_rad = 0.012;
   p.evidence.wheel_step_rad = kTickS * no_load_rad_s;
   return p;

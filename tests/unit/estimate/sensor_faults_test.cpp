@@ -101,7 +101,7 @@ struct Told {
 
 TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{{}, 0.01, 0.2});
+  TheEvidence evidence(EvidenceParams{0.01, 0.2});
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
@@ -118,7 +118,7 @@ TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
 
 TEST(Evidence, AGyroThatShakesIsBelievedLess) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{{}, 0.01, 0.2});
+  TheEvidence evidence(EvidenceParams{0.01, 0.2});
   evidence.reset(0.001);
   std::mt19937 random(1);
   std::normal_distribution<double> shakes(0.0, 0.05);
@@ -143,8 +143,8 @@ class Standing : public testing::Test {
 
   static SensorFaultsParams params() {
     SensorFaultsParams p;
-    p.evidence = {{}, 0.012, 0.15};
-    p.balances = p.jumps = {true, true, false};
+    p.evidence = {0.012, 0.15};
+    p.balances = {true, true, false};
     return p;
   }
   Sample sample() {
