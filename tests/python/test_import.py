@@ -46,27 +46,31 @@ def write_map(path, robot, time="column", **changes):
     return path
 
 
-@pytest.fixture(scope="module")
-def table(root, tmp_path_factory):
-    """20 s of the simulated eduMIP, driving, turning and pushed, as somebody else's CSV."""
-    folder = tmp_path_factory.mktemp("foreign")
+def foreign(folder, config, pushes, counts_per_rev):
+    """20 s of a simulated robot, driving, turning and pushed, as somebody else's CSV."""
     log = folder / "sim.lcm"
-    pushes = ", ".join(f"{{at_s={t}, duration_s=0.05, force_N=[0.0, 1.0]}}" for t in range(3, 18, 2))
-    run("sim", "--config", root / "config/edumip.toml", "--fidelity", "nominal", "--duration-s", 20,
+    told = ", ".join(f"{{at_s={t}, duration_s=0.05, force_N=[{x}, {y}]}}" for t, x, y in pushes)
+    run("sim", "--config", config, "--fidelity", "nominal", "--duration-s", 20,
         "--yaw-hz", 0.3, "--drive-mps", 0.1, "--telemetry", "off", "--log", log,
-        "--set", f"world.nominal.pushes=[{pushes}]")  # fmt: skip
+        "--set", f"world.nominal.pushes=[{told}]")  # fmt: skip
     run("convert", log, "--to", "csv")
     ours = pd.read_csv(log.with_suffix(".csv"))
     out = ours[list(SAMPLES)].rename(columns=SAMPLES)
     out[["gx", "gy", "gz"]] /= 16.4
     out[["ax", "ay", "az"]] /= 4096
     out.insert(0, "t", ours["t_s"])
-    for i in range(2):
-        out[f"e{i}"] = ours[f"sensors.encoder_counts_{i}"] * 2 * np.pi / 2134.62
+    for i, counts in enumerate(counts_per_rev):
+        out[f"e{i}"] = ours[f"sensors.encoder_counts_{i}"] * 2 * np.pi / counts
         out[f"d{i}"] = ours[f"motors.duty_{i}"]
     out["v"] = ours["health.battery_V"]
     out.to_csv(folder / "theirs.csv", index=False)
     return folder / "theirs.csv"
+
+
+@pytest.fixture(scope="module")
+def table(root, tmp_path_factory):
+    pushes = [(t, 0.0, 1.0) for t in range(3, 18, 2)]
+    return foreign(tmp_path_factory.mktemp("foreign"), root / "config/edumip.toml", pushes, [2134.62] * 2)
 
 
 def checks(table, map_file):
@@ -191,28 +195,9 @@ BALL |= {"accel": ["ax", "ay", "az"]}
 
 @pytest.fixture(scope="module")
 def ball_table(root, tmp_path_factory):
-    """20 s of the simulated MBBR, driving and pushed along both axes."""
-    folder = tmp_path_factory.mktemp("ball")
-    log = folder / "sim.lcm"
-    pushes = ", ".join(
-        f"{{at_s={t}, duration_s=0.05, force_N=[{float(t % 4 == 1)}, {float(t % 4 == 3)}]}}"
-        for t in range(3, 18, 2)
-    )
-    run("sim", "--config", root / "config/mbbr.toml", "--fidelity", "nominal", "--duration-s", 20,
-        "--yaw-hz", 0.3, "--drive-mps", 0.1, "--telemetry", "off", "--log", log,
-        "--set", f"world.nominal.pushes=[{pushes}]")  # fmt: skip
-    run("convert", log, "--to", "csv")
-    ours = pd.read_csv(log.with_suffix(".csv"))
-    out = ours[list(SAMPLES)].rename(columns=SAMPLES)
-    out[["gx", "gy", "gz"]] /= 16.4
-    out[["ax", "ay", "az"]] /= 4096
-    out.insert(0, "t", ours["t_s"])
-    for i in range(3):
-        out[f"e{i}"] = ours[f"sensors.encoder_counts_{i}"] * 2 * np.pi / 720
-        out[f"d{i}"] = ours[f"motors.duty_{i}"]
-    out["v"] = ours["health.battery_V"]
-    out.to_csv(folder / "theirs.csv", index=False)
-    return folder / "theirs.csv"
+    """Pushed along both axes in turn."""
+    pushes = [(t, float(t % 4 == 1), float(t % 4 == 3)) for t in range(3, 18, 2)]
+    return foreign(tmp_path_factory.mktemp("ball"), root / "config/mbbr.toml", pushes, [720] * 3)
 
 
 @pytest.mark.parametrize(
