@@ -150,6 +150,9 @@ equipoise: warning
     # 41,500 and twice, 3 or 4 times 8,500 cycles, of 5,000,000
     assert load["mbbr"] == pytest.approx({2: 0.0117, 3: 0.0134, 4: 0.0151})
     assert load["mip"] == pytest.approx({2: 0.0157, 3: 0.0194, 4: 0.0231})
+    robots["mbbr"]["tick"] = 3001  # more than the loop that held it
+    load = count_page.whole_load(firmware, robots)
+    assert load["mbbr"] == {2: None, 3: None, 4: None} and load["mip"][2] == pytest.approx(0.0157)
 
 
 def test_the_page_has_the_committed_numbers(root):

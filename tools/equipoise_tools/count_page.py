@@ -122,10 +122,14 @@ def a8_load(robots: dict) -> list[str]:
     ]
 
 
-def whole_load(firmware: dict, robots: dict) -> dict[str, dict[int, float]]:
-    """Of 1 GHz, by the cycles that an instruction outside the tick is taken to need."""
-    load: dict[str, dict[int, float]] = {}
+def whole_load(firmware: dict, robots: dict) -> dict[str, dict[int, float | None]]:
+    """Of 1 GHz, by the cycles that an instruction outside the tick is taken to need. None: the loop was
+    counted with another tick, it does not hold this one."""
+    load: dict[str, dict[int, float | None]] = {}
     for robot in ROBOTS:
+        if firmware[robot]["loop"] < robots[robot]["tick"]:
+            load[robot] = dict.fromkeys(CYCLES_OUTSIDE)
+            continue
         cycles, outside = robots[robot]["tick_cycles"], sum(firmware[robot].values()) - robots[robot]["tick"]
         load[robot] = {n: (n * outside + cycles) * TICK_HZ / CLOCK_HZ for n in CYCLES_OUTSIDE}
     return load
@@ -151,7 +155,7 @@ def firmware_table(counts: dict) -> list[str]:
     if robots is not None:
         load = whole_load(firmware, robots)
         for n in CYCLES_OUTSIDE:
-            cells = " | ".join(f"{load[r][n]:.1%}" for r in ROBOTS)
+            cells = " | ".join("not counted" if load[r][n] is None else f"{load[r][n]:.1%}" for r in ROBOTS)
             lines.append(f"| load of 1 GHz, {n} cycles for an instruction outside the tick | {cells} |")
     return [
         *lines,
