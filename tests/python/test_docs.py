@@ -77,6 +77,8 @@ def wrong_options(root: Path, said: list[str]) -> list[str]:
     text = help_of(command)
     if text is None:
         return [f"no command {' '.join(said[:2])}"]
+    if said[0].endswith("equipoise") and rest and re.fullmatch(r"[a-z-]+", rest[0]):
+        text += help_of((*command, rest[0])) or ""  # equipoise identify motor
     if "--" in rest:
         rest = rest[: rest.index("--")]  # options of the program behind
     given = [word.split("=")[0] for word in rest if re.match(r"--[a-z]", word)]

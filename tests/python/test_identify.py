@@ -2,9 +2,14 @@
 
 import json
 import subprocess
+import tomllib
 
+import numpy as np
+import pandas as pd
 import pytest
 from equipoise_tools.experiments.runs import binary
+from equipoise_tools.table import matlab
+from scipy.signal import lfilter
 
 # [T] Table 4.3, motor 1; the driver's switches (DRV8871) are in series with the winding.
 RESISTANCE, SWITCHES, TORQUE_CONSTANT, INDUCTANCE = 6.49, 0.565, 0.133, 0.362e-3
@@ -42,6 +47,116 @@ def test_motor_parameters_come_back_and_a_configuration_includes_them(brake_log,
                 tmp_path / "b.lcm", "--telemetry", "off", "--json", "-", status=0)  # fmt: skip
     sha = [json.loads(each.stdout)["config_sha256"] for each in (simulated, plain)]
     assert sha[0] != sha[1]
+
+
+def changed_log(brake_log_csv, tmp_path, change):
+    """The simulated bench's log as another sensor would have it."""
+    table = pd.read_csv(brake_log_csv)
+    change(table)
+    path = tmp_path / "changed.csv"
+    table.to_csv(path, index=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def brake_csv(tmp_path_factory):
+    trace = tmp_path_factory.mktemp("bench") / "brake.csv"
+    run(*BENCH, "--mode", "drive_brake", "--trace", trace)
+    return trace
+
+
+@pytest.mark.parametrize("keeps", [0.0, 0.75])  # of its last value: a filter of 15 ms
+def test_a_current_sensors_offset_and_filter_are_told_apart(brake_csv, tmp_path, keeps):
+    def changed(table):
+        table["current_A"] = lfilter([1.0 - keeps], [1.0, -keeps], table["current_A"]) + 0.3
+
+    log = changed_log(brake_csv, tmp_path, changed)
+    e = json.loads(run("identify", "motor", log, "--json", "-").stdout)["estimates"]
+    assert e["resistance_ohm"]["value"] == pytest.approx(RESISTANCE + SWITCHES, rel=0.02)
+    assert e["torque_constant_N_m_A"]["value"] == pytest.approx(TORQUE_CONSTANT, rel=0.02)
+    assert e["current_offset_A"]["value"] == pytest.approx(0.3, rel=0.05)
+    if keeps:
+        assert "coulomb_friction_N_m" not in e
+    else:
+        assert e["coulomb_friction_N_m"]["value"] == pytest.approx(0.004, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ("noisy", "filtered, late or noisy"),
+        ("bent", "not linear"),
+        ("supply", "the supply's current"),
+        ("dead", "never changes"),
+        ("wrong column", "not related"),
+    ],
+)
+def test_a_current_that_is_not_the_motors_is_refused_with_the_reason(brake_csv, tmp_path, change, reason):
+    def changed(table):
+        i, u = table["current_A"].to_numpy(), table["u"].to_numpy()
+        rng = np.random.default_rng(1)
+        table["current_A"] = {
+            "noisy": i + rng.normal(0.0, 0.3, len(i)),
+            "bent": i * (1.0 - 0.5 * np.abs(i) / np.abs(i).max()),
+            "supply": i * np.abs(u),
+            "dead": 0.0 * i + 0.002,
+            "wrong column": rng.normal(0.0, 1.0, len(i)),
+        }[change]
+        if change == "wrong column":
+            table["angle_rad"] = rng.normal(0.0, 1.0, len(i)).cumsum()
+
+    done = run("identify", "motor", changed_log(brake_csv, tmp_path, changed), status=2)
+    assert reason in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_coasting_is_told_from_the_samples_alone(tmp_path):
+    trace = tmp_path / "coast.csv"
+    run(*BENCH, "--mode", "drive_coast", "--trace", trace)
+    assert "the bridge coasts" in run("identify", "motor", trace, status=2).stderr
+
+
+# R and k of the authors; None: refused. Of 26, the rest say why not.
+REAL = {("current_sensor_30rs_60rs_3.txt", 1), ("current_sensor_30rs_60rs_3.txt", 2)}
+
+
+@pytest.mark.parametrize("name", ["regbot_current_sensor", "regbot_motortest", "mini_segway_20d"])
+def test_real_motors_are_as_published_or_refused(root, tmp_path, name):
+    map_file = root / f"config/real/motors/{name}.toml"
+    described = tomllib.loads(map_file.read_text())
+    source = described["source"]
+    folder = root.parent / "shared/real" / source["repository"].replace("/", "+")
+    files = sorted(folder.glob(source["path"]))
+    if not files:
+        pytest.skip(f"no {source['path']}: docs/reality.md says where it is from")
+    taken = set()
+    for file in files:
+        table = tmp_path / f"{file.name}.csv" if file.suffix == ".mat" else file
+        if file.suffix == ".mat":
+            matlab(file).to_csv(table, index=False)
+        for motor in (1, 2):
+            command = [
+                binary(),
+                "identify",
+                "motor",
+                table,
+                "--map",
+                map_file,
+                "--motor",
+                motor,
+                "--json",
+                "-",
+            ]
+            done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+            if done.returncode == 2:
+                assert "R2" in done.stderr or "never changes" in done.stderr
+                continue
+            assert done.returncode == 0, done.stderr
+            e = json.loads(done.stdout)["estimates"]
+            for key, published in described["published"].items():
+                assert e[key]["determined"]
+                assert e[key]["value"] == pytest.approx(published, rel=0.1), (file.name, motor, key)
+            taken.add((file.name, motor))
+    assert taken == {each for each in REAL if each[0] in {f.name for f in files}}
 
 
 def test_a_locked_step_gives_the_inductance(tmp_path):

@@ -11,7 +11,7 @@
 #include <limits>
 #include <memory>
 
-#include "app/import/table.hpp"
+#include "app/import/import.hpp"
 #include "app/log/log_reader.hpp"
 #include "app/text/errors.hpp"
 
@@ -116,6 +116,13 @@ void write_bench_log(const std::string& path, const BenchLog& log) {
     ++message.tick;
   }
   if (std::fflush(file->f) != 0) throw InputError(path + ": cannot be written: " + std::strerror(errno));
+}
+
+BenchLog read_bench_table(const std::string& path, const std::string& map, int motor) {
+  const ImportMap columns = read_bench_map(map);
+  BenchLog log;
+  log.rows = imported_bench(read_table(path, columns.table), columns, static_cast<std::size_t>(motor - 1));
+  return log;
 }
 
 BenchLog read_bench_log(const std::string& path) {

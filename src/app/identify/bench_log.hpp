@@ -23,5 +23,7 @@ struct BenchLog {
 void write_bench_log(const std::string& path, const BenchLog& log);
 /// By its name: .csv, else LCM.
 BenchLog read_bench_log(const std::string& path);
+/// Another recorder's table, by a map of its columns; `motor` counts from 1.
+BenchLog read_bench_table(const std::string& path, const std::string& map, int motor);
 
 }  // namespace equipoise::app

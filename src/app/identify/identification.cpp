@@ -1,8 +1,10 @@
 #include "app/identify/identification.hpp"
 
 #include <limits>
+#include <utility>
 
 #include "app/identify/least_squares.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -46,48 +48,130 @@ std::string unusable(const BenchLog& log, bool electrical) {
   return "";
 }
 
-/// Electrical regression over windows of at least 50 us: means of voltage, current, speed; change of the
-/// current between the window's ends, which are halfway between samples.
-LeastSquares electrical_fit(const BenchLog& log) {
-  constexpr double kWindow_s = 50e-6;
-  const auto w = static_cast<std::size_t>(std::max(1.0, std::round(kWindow_s / sample_s(log))));
+/// Means of voltage, current, speed over windows; change of the current between a window's ends, which are
+/// halfway between samples.
+struct Electrical {
+  Eigen::MatrixXd A;  // current, rate, change of current, and 1 when `offset` is asked for
+  Eigen::VectorXd voltage, duty;
+};
+
+Electrical electrical_windows(const BenchLog& log, double window_s, bool offset) {
+  const auto w = static_cast<std::size_t>(std::max(1.0, std::round(window_s / sample_s(log))));
   const auto n = static_cast<Index>((log.rows.size() - 2) / w);
-  Eigen::MatrixXd A(n, 3);
-  Eigen::VectorXd b(n);
+  Electrical e{Eigen::MatrixXd::Ones(n, offset ? 4 : 3), Eigen::VectorXd(n), Eigen::VectorXd(n)};
   for (Index j = 0; j < n; ++j) {
     const std::size_t first = 1 + static_cast<std::size_t>(j) * w;
     const std::size_t last = first + w - 1;
     double current = 0.0;
     double voltage = 0.0;
+    double duty = 0.0;
     for (std::size_t i = first; i <= last; ++i) {
       current += log.rows[i].current_A;
       voltage += log.rows[i].u * log.rows[i].supply_V;
+      duty += log.rows[i].u;
     }
     const auto count = static_cast<double>(w);
     const double time = log.rows[last].t_s - log.rows[first - 1].t_s;
     const double di = 0.5 * (log.rows[last + 1].current_A + log.rows[last].current_A -
                              log.rows[first].current_A - log.rows[first - 1].current_A);
-    A(j, 0) = current / count;
-    A(j, 1) = (log.rows[last].angle_rad - log.rows[first - 1].angle_rad) / time;
-    A(j, 2) = di / time;
-    b(j) = voltage / count;
+    e.A(j, 0) = current / count;
+    e.A(j, 1) = (log.rows[last].angle_rad - log.rows[first - 1].angle_rad) / time;
+    e.A(j, 2) = di / time;
+    e.voltage(j) = voltage / count;
+    e.duty(j) = duty / count;
   }
-  return least_squares(A, b);
+  return e;
 }
 
-/// Measured current over (4.3)'s where the command is small: coasting bridges lose current there, braking
-/// ones do not.
-double gain_at_small_duty(const BenchLog& log, double R, double k) {
-  double predicted_sq = 0.0;
-  double product = 0.0;
-  for (std::size_t i = 1; i < log.rows.size(); ++i) {
-    const BenchSample& s = log.rows[i];
-    if (std::abs(s.u) > 0.4) continue;
-    const double linear = (s.u * s.supply_V - k * rate(log, i)) / R;
-    predicted_sq += linear * linear;
-    product += linear * s.current_A;
+/// R where the command is small, over R of the whole log, less its own uncertainty: coasting bridges lose
+/// current there, braking ones do not.
+double resistance_at_small_duty(const Electrical& e, const Eigen::VectorXd& x) {
+  constexpr double kSmall = 0.4;
+  double squares = 0.0;
+  double products = 0.0;
+  double voltages = 0.0;
+  double count = 0.0;
+  const double offset_V = x.size() > 3 ? x(3) : 0.0;
+  for (Index j = 0; j < e.A.rows(); ++j) {
+    if (std::abs(e.duty(j)) > kSmall) continue;
+    const double current = e.A(j, 0) + offset_V / x(0);  // less the sensor's zero
+    const double voltage = e.voltage(j) - x(1) * e.A(j, 1);
+    squares += current * current;
+    products += current * voltage;
+    voltages += voltage * voltage;
+    count += 1.0;
   }
-  return predicted_sq > 0.0 ? product / predicted_sq : 1.0;
+  if (squares == 0.0 || count < 3.0) return 1.0;
+  const double small = products / squares;
+  const double sigma = std::sqrt(std::max(0.0, voltages - small * products) / (count - 1.0) / squares);
+  return (small - 1.96 * sigma) / x(0);
+}
+
+/// How much less is unexplained when the current may count more or less the larger it is.
+double share_of_a_bent_current(const Electrical& e, double r_squared) {
+  const double mean = e.A.col(0).mean();
+  const Eigen::ArrayXd current = e.A.col(0).array() - mean;
+  const double sigma = std::sqrt(current.square().mean());
+  if (sigma == 0.0) return 0.0;
+  Eigen::MatrixXd A(e.A.rows(), e.A.cols() + 2);
+  A << e.A, current.square() / sigma, current.cube() / (sigma * sigma);
+  return 1.0 - (1.0 - least_squares(A, e.voltage).r_squared) / (1.0 - r_squared);
+}
+
+constexpr double kFine_s = 5e-3;
+constexpr double kCoarse_s = 20e-3;
+constexpr double kSweep_s = 0.4;  // shorter logs are locked steps, sampled fast: L instead of k
+constexpr double kPrecise = 0.1;  // of R and k
+
+std::string coasts(const Electrical& rows, const LeastSquares& fit) {
+  constexpr double kSuspicious = 1.18;
+  if (fit.x(0) > 0.0 &&
+      (std::abs(fit.x(1)) < fit.half_width(1) || resistance_at_small_duty(rows, fit.x) < kSuspicious))
+    return "";
+  return format(
+      "at small duty the current is far below (u V - k omega)/R (R2 %.3f): the bridge coasts, or the sensor "
+      "measures the supply's current; record the log with the driver in drive/brake mode and the sensor in "
+      "the motor's line",
+      fit.r_squared);
+}
+
+/// Why a sweep does not give R and k; empty: it does.
+std::string why_not(const BenchLog& log, const Electrical& rows, const LeastSquares& fit) {
+  if (rows.A.col(0).maxCoeff() - rows.A.col(0).minCoeff() < 1e-6)
+    return "current_A never changes: the sensor or the driver is off";
+  if (rows.voltage.maxCoeff() - rows.voltage.minCoeff() < 1e-6)
+    return "the voltage u supply_V never changes: record a step or a sweep";
+  constexpr double kRelated = 0.5;
+  if (fit.r_squared < kRelated)
+    return format(
+        "voltage, current and speed are not related as V = R i + k omega (R2 %.3f): the driver or the sensor "
+        "is off, or a unit, a sign or a column is wrong",
+        fit.r_squared);
+  const std::string coasting = coasts(rows, fit);
+  if (!coasting.empty()) return coasting;
+  const Electrical fine_rows = electrical_windows(log, kFine_s, true);
+  const LeastSquares fine = least_squares(fine_rows.A, fine_rows.voltage);
+  for (const auto& [i, name] : {std::pair<Index, const char*>{0, "R"}, {1, "k"}}) {
+    const double least = std::max(fine.half_width(i) + fit.half_width(i), 0.25 * kPrecise * fit.x(i));
+    if (std::abs(fine.x(i) - fit.x(i)) <= least) continue;
+    return format(
+        "%s is %.4g +- %.2g from means of 5 ms and %.4g +- %.2g from means of 20 ms (R2 %.3f, %.3f): the "
+        "current sensor is filtered, late or noisy; record with the filter off",
+        name, fine.x(i), fine.half_width(i), fit.x(i), fit.half_width(i), fine.r_squared, fit.r_squared);
+  }
+  constexpr double kMostOfIt = 0.5;
+  const double bent = share_of_a_bent_current(rows, fit.r_squared);
+  if (bent > kMostOfIt)
+    return format(
+        "%.0f %% of what V = R i + k omega leaves unexplained (R2 %.3f) goes with the current's square and "
+        "cube: the current sensor is not linear, or its zero or the supply moves with the load",
+        100.0 * bent, fit.r_squared);
+  if (!(fit.half_width(0) < kPrecise * fit.x(0)))
+    return format(
+        "R is %.3g +- %.2g ohm, and +-10 %% is asked for (R2 %.3f): drive larger changes of current, or "
+        "several steps in one log",
+        fit.x(0), fit.half_width(0), fit.r_squared);
+  return "";
 }
 
 /// Means under the triangular weight with which the difference of two mean rates is the mean acceleration.
@@ -143,11 +227,16 @@ std::vector<Window> windows_in_motion(const BenchLog& log, double min_rate_rad_s
   return windows;
 }
 
+struct Flywheel {
+  double inertia_kg_m2 = 0.0;  // 0: not known
+  double current_zero_A = 0.0;
+};
+
 /// Coulomb and viscous friction at the motor's output, and the inertia unless it is known.
-void add_motor_friction(const BenchLog& log, double k, double inertia_kg_m2, Identified* out) {
+void add_motor_friction(const BenchLog& log, double k, const Flywheel& flywheel, Identified* out) {
   const std::vector<Window> windows = windows_in_motion(log, kMoving_rad_s);
   if (windows.size() < kMinSamples) return;
-  const bool known = inertia_kg_m2 > 0.0;
+  const bool known = flywheel.inertia_kg_m2 > 0.0;
   const auto n = static_cast<Index>(windows.size());
   Eigen::MatrixXd A(n, known ? 2 : 3);
   Eigen::VectorXd b(n);
@@ -155,9 +244,9 @@ void add_motor_friction(const BenchLog& log, double k, double inertia_kg_m2, Ide
     const Window& w = windows[static_cast<std::size_t>(j)];
     A(j, 0) = sign(w.rate);
     A(j, 1) = w.rate;
-    b(j) = k * w.current_A;
+    b(j) = k * (w.current_A - flywheel.current_zero_A);
     if (known) {
-      b(j) -= inertia_kg_m2 * w.acceleration;
+      b(j) -= flywheel.inertia_kg_m2 * w.acceleration;
     } else {
       A(j, 2) = w.acceleration;
     }
@@ -211,25 +300,28 @@ Identified identify_motor(const BenchLog& log, double inertia_kg_m2) {
         "record it with the driver in drive/brake mode";
     return out;
   }
-  const LeastSquares e = electrical_fit(log);
+  const bool sweep = log.rows.back().t_s - log.rows.front().t_s > kSweep_s;
+  const Electrical rows = electrical_windows(log, sweep ? kCoarse_s : 50e-6, sweep);
+  const LeastSquares e = least_squares(rows.A, rows.voltage);
   const double R = e.x(0);
   const double k = e.x(1);
   out.r_squared = e.r_squared;
-  constexpr double kSuspicious = 0.85;
-  if (R <= 0.0 || (std::abs(k) > e.half_width(1) && gain_at_small_duty(log, R, k) < kSuspicious)) {
-    out.refused =
-        "at small duty the current is far below (u V - k omega)/R: the bridge coasts; record the log with "
-        "the driver in drive/brake mode";
-    return out;
-  }
-  out.estimates = {{"resistance_ohm", R, e.half_width(0)},
-                   {"torque_constant_N_m_A", k, e.half_width(1)},
+  out.refused = sweep ? why_not(log, rows, e) : coasts(rows, e);
+  if (!out.refused.empty()) return out;
+  out.estimates = {{"resistance_ohm", R, e.half_width(0), kPrecise},
+                   {"torque_constant_N_m_A", k, e.half_width(1), kPrecise},
                    {"inductance_H", e.x(2), e.half_width(2)}};
-  // A current that settles within two samples leaves no trace of L.
-  if (e.x(2) < 2.0 * R * sample_s(log)) {
+  const double zero_A = sweep ? -e.x(3) / R : 0.0;
+  if (sweep && std::abs(e.x(3)) > e.half_width(3))
+    out.estimates.push_back({"current_offset_A", zero_A, e.half_width(3) / R});
+  // A current that settles within two samples, or within a mean, leaves no trace of L.
+  if (e.x(2) < 2.0 * R * (sweep ? kCoarse_s : sample_s(log))) {
     out.estimates[2].half_width = std::numeric_limits<double>::infinity();
   }
-  if (out.estimates[1].determined()) add_motor_friction(log, k, inertia_kg_m2, &out);
+  // No small motor's current takes as long: a filtered sensor's, which R and k do not mind and the torque
+  // does.
+  const bool filtered = sweep && e.x(2) - e.half_width(2) > kFine_s * R;
+  if (out.estimates[1].determined() && !filtered) add_motor_friction(log, k, {inertia_kg_m2, zero_A}, &out);
   return out;
 }
 

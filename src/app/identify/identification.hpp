@@ -14,8 +14,8 @@ struct Estimate {
   std::string name;  // with its unit
   double value = 0.0;
   double half_width = 0.0;  // 95 %
-  /// Zero, and four times less or more, lie well outside the interval.
-  bool determined() const { return half_width < 0.25 * std::abs(value); }
+  double within = 0.25;  // at most this share of the value: zero and four times less or more are far outside
+  bool determined() const { return half_width < within * std::abs(value); }
 };
 
 struct Identified {
@@ -31,8 +31,9 @@ struct Identified {
   }
 };
 
-/// R, k, L from u V = R i + k omega + L di/dt, integrated; then friction from k i = J omega' + friction.
-/// `inertia_kg_m2`: of the known flywheel; 0 leaves it to be estimated as well.
+/// R, k, L from u V = R (i - i0) + k omega + L di/dt, integrated, i0 being the sensor's zero; then friction
+/// from k i = J omega' + friction. `inertia_kg_m2`: of the known flywheel; 0 leaves it to be estimated as
+/// well.
 Identified identify_motor(const BenchLog& log, double inertia_kg_m2);
 
 struct FrictionRig {

@@ -16,6 +16,8 @@ struct IdentifyArguments {
   std::string log;
   std::string out;
   std::string json;
+  std::string map;
+  int motor = 1;
   double inertia_kg_m2 = 0.0;
   FrictionRig rig;
 };
@@ -94,8 +96,14 @@ void add_motor(Subcommand identify, const std::shared_ptr<IdentifyArguments>& a)
                                .example("equipoise identify motor bench.lcm --out motor.toml");
   add_common(motor, a);
   motor.option("--inertia-kg-m2", a->inertia_kg_m2, "of the flywheel, when it is known").range(1e-7, 10.0);
+  const Option map =
+      motor
+          .option("--map", a->map, "TOML: what the columns of another recorder's table mean; docs/reality.md")
+          .file();
+  motor.option("--motor", a->motor, "which of the map's motors").show_default().range(1, 4).needs(map);
   motor.action([=] {
-    return report(*a, identify_motor(read_bench_log(a->log), a->inertia_kg_m2),
+    const BenchLog log = a->map.empty() ? read_bench_log(a->log) : read_bench_table(a->log, a->map, a->motor);
+    return report(*a, identify_motor(log, a->inertia_kg_m2),
                   {"motor", {"resistance_ohm", "torque_constant_N_m_A", "inductance_H"}});
   });
 }

@@ -88,6 +88,26 @@ std::vector<double> row_times(const Columns& columns, const ImportMap& map, std:
   return t;
 }
 
+/// Rows in the time that the map asks for, each after the one before.
+std::vector<std::size_t> advancing_rows(const Columns& columns, const ImportMap& map, std::size_t count,
+                                        ImportedRows* rows) {
+  if (count == 0) throw InputError("the table has no row of numbers");
+  std::vector<std::size_t> used;
+  const std::vector<double> times = row_times(columns, map, count);
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    if (!(times[k] >= map.from_s && times[k] <= map.to_s)) continue;
+    if (!rows->t_s.empty() && !(times[k] > rows->t_s.back())) {
+      ++rows->not_advancing;
+      continue;
+    }
+    rows->t_s.push_back(times[k]);
+    used.push_back(k);
+  }
+  if (used.size() < 2)
+    throw InputError("fewer than two rows of the table are in the time that the map asks for");
+  return used;
+}
+
 /// Mean over an interval of what each row holds until the next one.
 class Held {
  public:
@@ -194,22 +214,9 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
                      " columns; a robot of type " + robot.run.robot + " has " + std::to_string(wheels) +
                      " wheels");
   }
-  if (table.rows() == 0) throw InputError("the table has no row of numbers");
   const Columns columns(table);
   ImportedRows rows;
-  std::vector<std::size_t> used;
-  const std::vector<double> times = row_times(columns, map, table.rows());
-  for (std::size_t k = 0; k < times.size(); ++k) {
-    if (!(times[k] >= map.from_s && times[k] <= map.to_s)) continue;
-    if (!rows.t_s.empty() && !(times[k] > rows.t_s.back())) {
-      ++rows.not_advancing;
-      continue;
-    }
-    rows.t_s.push_back(times[k]);
-    used.push_back(k);
-  }
-  if (rows.t_s.size() < 2)
-    throw InputError("fewer than two rows of the table are in the time that the map asks for");
+  const std::vector<std::size_t> used = advancing_rows(columns, map, table.rows(), &rows);
   constexpr double kLongest_s = 7200.0;  // one wrong stamp would ask for ticks until the memory is full
   const double lasts_s = rows.t_s.back() - rows.t_s.front();
   if (!(lasts_s <= kLongest_s))
@@ -252,6 +259,30 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
     }
   }
   return rows;
+}
+
+std::vector<BenchSample> imported_bench(const Table& table, const ImportMap& map, std::size_t motor) {
+  for (const auto& [key, channel] :
+       {std::pair{"wheels", &map.wheels}, std::pair{"drive", &map.drive}, std::pair{"current", &map.current}})
+    if (channel->axes.size() <= motor)
+      throw InputError(format("%s.axes of the map names %zu columns: there is no motor %zu", key,
+                              channel->axes.size(), motor + 1));
+  if (map.drive.kind == "torque") throw InputError("drive.kind of a motor bench is volts or duty");
+  const Columns columns(table);
+  ImportedRows rows;
+  const std::vector<std::size_t> used = advancing_rows(columns, map, table.rows(), &rows);
+  std::vector<double> angle = channel_column(columns, map.wheels, motor, rows.t_s, used);
+  if (map.wheels.kind == "rate") integrate(rows.t_s, &angle);
+  const std::vector<double> drive = channel_column(columns, map.drive, motor, rows.t_s, used);
+  const std::vector<double> current = channel_column(columns, map.current, motor, rows.t_s, used);
+  const std::vector<double> battery = map.battery.name.empty() ? std::vector<double>{} : columns(map.battery);
+  std::vector<BenchSample> samples(used.size());
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const double supply_V = battery.empty() ? map.battery_V : battery[used[k]];
+    samples[k] = {rows.t_s[k], map.drive.kind == "duty" ? drive[k] : drive[k] / supply_V, current[k],
+                  supply_V, angle[k]};
+  }
+  return samples;
 }
 
 std::vector<runtime::TickRecord> imported_ticks(const ImportedRows& rows, const ImportMap& map,

@@ -9,6 +9,7 @@
 
 #include "app/import/import_map.hpp"
 #include "equipoise/actuate/bridge.hpp"
+#include "equipoise/plant/motor_bench.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/sense/calibrate.hpp"
 
@@ -42,6 +43,8 @@ struct ImportedRows {
 };
 
 ImportedRows imported_rows(const Table& table, const ImportMap& map, const ImportedRobot& robot);
+/// One motor of a bench; rows whose time does not advance are left out.
+std::vector<BenchSample> imported_bench(const Table& table, const ImportMap& map, std::size_t motor);
 std::vector<runtime::TickRecord> imported_ticks(const ImportedRows& rows, const ImportMap& map,
                                                 const ImportedRobot& robot);
 

@@ -91,6 +91,27 @@ TableShape read_shape(Section s) {
   return shape;
 }
 
+/// What every table has: time, wheels, drive, battery.
+void read_motion(Section& root, ImportMap* map) {
+  if (root.has("source")) {
+    Section source = root.table("source");
+    for (const char* key : {"repository", "commit", "path", "licence", "sha256"})
+      if (source.has(key)) map->source[key] = source.text(key);
+    source.finish();
+  }
+  if (root.has("table")) map->table = read_shape(root.table("table"));
+  read_time(root.table("time"), map);
+  map->wheels = read_kind(root.table("wheels"), {{"angle", kAngle}, {"rate", kWheelRate}});
+  map->drive = read_kind(root.table("drive"), {{"volts", kVolts}, {"duty", kDuty}, {"torque", kTorque}});
+  Section battery = root.table("battery");
+  if (battery.has("column")) {
+    map->battery = signed_column(battery.text("column"), read_scale(battery, kVolts));
+  } else {
+    map->battery_V = battery.number("volts", 0.1, 1000.0);
+  }
+  battery.finish();
+}
+
 }  // namespace
 
 ImportMap read_import_map(const std::string& path) {
@@ -98,14 +119,7 @@ ImportMap read_import_map(const std::string& path) {
   Section root(document, document.root(), "");
   ImportMap map;
   map.robot = (std::filesystem::path(path).parent_path() / root.text("robot")).lexically_normal().string();
-  if (root.has("source")) {
-    Section source = root.table("source");
-    for (const char* key : {"repository", "commit", "path", "licence", "sha256"})
-      if (source.has(key)) map.source[key] = source.text(key);
-    source.finish();
-  }
-  if (root.has("table")) map.table = read_shape(root.table("table"));
-  read_time(root.table("time"), &map);
+  read_motion(root, &map);
   if (root.has("balancing")) {
     for (Section& s : root.tables("balancing", 1, 1000)) {
       const double from_s = s.number("from_s", 0.0, 1e9);
@@ -115,19 +129,26 @@ ImportMap read_import_map(const std::string& path) {
   }
   map.gyro = read_imu(root.table("gyro"), kRate);
   map.accel = read_imu(root.table("accel"), kAcceleration);
-  map.wheels = read_kind(root.table("wheels"), {{"angle", kAngle}, {"rate", kWheelRate}});
-  map.drive = read_kind(root.table("drive"), {{"volts", kVolts}, {"duty", kDuty}, {"torque", kTorque}});
-  Section battery = root.table("battery");
-  if (battery.has("column")) {
-    map.battery = signed_column(battery.text("column"), read_scale(battery, kVolts));
-  } else {
-    map.battery_V = battery.number("volts", 0.1, 1000.0);
-  }
-  battery.finish();
   if (root.has("tilt")) {
     Section tilt = root.table("tilt");
     map.tilt = signed_column(tilt.text("column"), read_scale(tilt, kAngle));
     tilt.finish();
+  }
+  root.finish();
+  return map;
+}
+
+ImportMap read_bench_map(const std::string& path) {
+  const Document document(path, {});
+  Section root(document, document.root(), "");
+  ImportMap map;
+  read_motion(root, &map);
+  Section current = root.table("current");
+  map.current = read_channel(current, {{"A", 1.0}, {"mA", 1e-3}});
+  if (root.has("published")) {  // what ./tools/reality compares with
+    Section published = root.table("published");
+    for (const char* key : {"resistance_ohm", "torque_constant_N_m_A"}) published.number(key, 0.0, 1e6);
+    published.finish();
   }
   root.finish();
   return map;

@@ -53,8 +53,11 @@ struct ImportMap {
   SignedColumn battery;  // empty: battery_V
   double battery_V = kNotGiven;
   SignedColumn tilt;  // the robot's own estimate, about body x; empty: none
+  Channel current;    // of a motor bench, in the order of its motors
 };
 
 ImportMap read_import_map(const std::string& path);
+/// Of a motor bench: time, wheels (the shafts), drive, current, battery; no robot.
+ImportMap read_bench_map(const std::string& path);
 
 }  // namespace equipoise::app
