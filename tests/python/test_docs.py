@@ -77,7 +77,7 @@ def wrong_options(root: Path, said: list[str]) -> list[str]:
     text = help_of(command)
     if text is None:
         return [f"no command {' '.join(said[:2])}"]
-    if said[0].endswith("equipoise") and rest and re.fullmatch(r"[a-z-]+", rest[0]):
+    if said[0].endswith("equipoise") and rest and re.fullmatch(r"[a-z][a-z-]*", rest[0]):
         text += help_of((*command, rest[0])) or ""  # equipoise identify motor
     if "--" in rest:
         rest = rest[: rest.index("--")]  # options of the program behind
