@@ -32,11 +32,19 @@ struct MbbrAccess {
             {"ball_radius_m", p.r},
             {"ball_inertia_kg_m2", p.I_b},
             {"wheel_inertia_about_ball_kg_m2", p.I_w},
+            {"wheel_radius_m", p.r_w},
+            {"wheel_axes", columns_of(p.wheel_axes())},
+            {"wheel_contacts", columns_of(wheel_contacts(p))},
             {"imu_position_m", {p.l_a.x(), p.l_a.y(), p.l_a.z()}},
             {"floor_grip", world.floor.grip},
             {"floor_torsion_radius_m", world.floor.torsion_radius_m},
             {"floor_slope_rad", {world.common.floor_slope_rad.x(), world.common.floor_slope_rad.y()}},
             {"step_s", world.common.step_s}};
+  }
+  static nlohmann::json columns_of(const Mat3& matrix) {
+    nlohmann::json columns;
+    for (const auto& c : matrix.colwise()) columns.push_back({c.x(), c.y(), c.z()});
+    return columns;
   }
   static MbbrEstimate estimate(const StateView& v, const MbbrParameters&) {
     MbbrEstimate x;

@@ -14,7 +14,7 @@ from equipoise_tools.lint.words import TERMS, pages, words
 # Inline code that looks like a path of the repository.
 _PATH = re.compile(r"(?:config|docs|drivers|examples|include|lcm|packaging|python|src|tests|tools)/[\w./-]+")
 _KEY_TABLES = "attitude|calibration|chain|controller|estimator|friction|motor|reference|robot|safety|world"
-_KEY = re.compile(rf"(?:{_KEY_TABLES})\.[a-z_][\w.\[\]*]*")
+_KEY = re.compile(rf"(?<!equipoise_)(?:{_KEY_TABLES})\.[a-z_][\w.\[\]*]*")
 _TEST = re.compile(r"test_\w+\.py::test_\w+")
 _LINE = re.compile(r"([\w./-]+\.(?:py|cpp|hpp|h|c|toml|md)):(\d+)")
 _NUMBER_LINK = re.compile(

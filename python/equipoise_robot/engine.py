@@ -1,0 +1,65 @@
+"""MuJoCo's rigid bodies behind our motors, gears, friction and sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._data import need
+
+Array = NDArray[np.float64]
+
+
+class Engine:
+    """The bodies of one robot; `inputs` and `outputs` as _core.run_in_engine has them."""
+
+    def __init__(self, xml: str, inputs: Array, outputs: Array) -> None:
+        self.mujoco = need("mujoco", "mujoco")
+        self.model = self.mujoco.MjModel.from_xml_string(xml)
+        self.data = self.mujoco.MjData(self.model)
+        for i in range(self.model.nnumeric):
+            exact = self.model.numeric(i)
+            self.model.body(exact.name.removeprefix("inertia_")).inertia[:] = exact.data
+        self.mujoco.mj_setConst(self.model, self.data)
+        self.body = self.model.body("robot").id
+        self.torque, self.push, self.drag = inputs[:3], inputs[3:5], inputs[5:7]
+        self.R_WB, self.gyro, self.force = outputs[:9], outputs[9:12], outputs[12:15]
+        self.joint_rate, self.position, self.velocity = outputs[15:18], outputs[18:21], outputs[21:24]
+        self.pushed = self.data.xfrc_applied[self.body][:2]
+        self.accelerometer = self.data.sensor("accel").data
+        self.has_ball = self.model.nq == 11
+        ball = self.model.body("ball").id if self.has_ball else self.body
+        self.dragged = self.data.xfrc_applied[ball][:2]
+        self.back = np.zeros(4)
+
+    def start(self) -> None:
+        self.mujoco.mju_mat2Quat(self.data.qpos[3:7], self.R_WB)
+        self.mujoco.mj_forward(self.model, self.data)
+        self.read()
+
+    def step(self) -> None:
+        data, lib = self.data, self.mujoco
+        if self.has_ball:  # the engine has the joint in the ball's own axes
+            lib.mju_negQuat(self.back, data.qpos[7:11])
+            lib.mju_rotVecQuat(data.qfrc_applied[6:9], self.torque, self.back)
+        else:
+            data.qfrc_applied[6:8] = self.torque[:2]
+        self.dragged[:] = self.drag
+        if self.has_ball:
+            self.pushed[:] = self.push
+        else:
+            self.pushed[:] += self.push
+        lib.mj_step(self.model, data)
+        self.read()
+
+    def read(self) -> None:
+        data, lib = self.data, self.mujoco
+        lib.mju_quat2Mat(self.R_WB, data.qpos[3:7])
+        self.gyro[:] = data.qvel[3:6]
+        self.force[:] = self.accelerometer
+        if self.has_ball:
+            lib.mju_rotVecQuat(self.joint_rate, data.qvel[6:9], data.qpos[7:11])
+        else:
+            self.joint_rate[:2] = data.qvel[6:8]
+        self.position[:] = data.qpos[:3]
+        self.velocity[:] = data.qvel[:3]
