@@ -10,6 +10,8 @@ stops the motors.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 
 from . import _core
 from ._data import need
+from .errors import UserError
 from .simulation import request
 
 need("gymnasium", "gym")
@@ -28,6 +31,7 @@ from gymnasium.vector.utils import batch_space  # noqa: E402
 
 Array = NDArray[np.float64]
 TICK_HZ = 200
+ENGINES = ("own", "mujoco")
 _LONGEST_S = 360000.0
 _SCALES = {  # errors that cost 1
     "theta": 0.1,
@@ -42,6 +46,23 @@ _SCALES = {  # errors that cost 1
 _ACTION_COST = 0.05
 
 
+def _engine(name: str, robot: str) -> Callable[[str, Array, Array], Any] | None:
+    """What the core builds each episode's bodies by; None: its own."""
+    if name not in ENGINES:
+        raise UserError(f"engine: {name!r} is none; they are {', '.join(ENGINES)}")
+    if name == "own":
+        return None
+    from .engine import Engine
+    from .models import mjcf
+
+    def make(dimensions: str, inputs: Array, outputs: Array) -> Any:
+        engine = Engine(mjcf(robot, json.loads(dimensions)), inputs, outputs)
+        return engine.start, engine.step
+
+    need("mujoco", "mujoco")
+    return make
+
+
 class _Robots:
     """What both environments share: the simulated robots, spaces, reward."""
 
@@ -52,11 +73,15 @@ class _Robots:
         jobs: int,
         population: tuple[int, int] | None,
         asked: dict[str, Any],
+        engine: str = "own",
     ):
         self.request = request(robot, duration_s=_LONGEST_S, **asked)
-        self.names = _core.observation_names(_core.robot_type(self.request.config))
+        robot_type = _core.robot_type(self.request.config)
+        self.names = _core.observation_names(robot_type)
         weights = [1.0 / _SCALES[name] if name in _SCALES else 0.0 for name in self.names]
-        self.episodes = _core.Episodes(self.request, count, jobs, weights, _ACTION_COST)
+        self.episodes = _core.Episodes(
+            self.request, count, jobs, weights, _ACTION_COST, _engine(engine, robot_type)
+        )
         self.population = population
         # Views of what the core writes; active: in the next step, by the core's will or by ours.
         self.observations, self.rewards = self.episodes.observations, self.episodes.rewards
@@ -93,15 +118,17 @@ class BalanceEnv(gymnasium.Env[Array, Array]):
         fidelity: str = "nominal",
         population: tuple[int, int] | None = None,
         set: dict[str, Any] | tuple[str, ...] = (),
+        engine: str = "own",
     ) -> None:
         """population: each episode simulates a robot drawn from these numbers, first to last; with fidelity
-        "full"."""
+        "full". engine: whose rigid bodies and contacts, "own" or "mujoco"."""
         self._robots = _Robots(
             robot,
             count=1,
             jobs=1,
             population=population,
             asked={"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
+            engine=engine,
         )
         self.observation_space = self._robots.observation_space
         self.action_space = self._robots.action_space
@@ -146,8 +173,10 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
         population: tuple[int, int] | None = None,
         set: dict[str, Any] | tuple[str, ...] = (),
         jobs: int = 0,
+        engine: str = "own",
     ) -> None:
-        """jobs: threads that step the robots, 0 for one per core; the results do not depend on it."""
+        """jobs: threads that step the robots, 0 for one per core; the results do not depend on it. With
+        engine="mujoco" there is one."""
         self.num_envs = num_envs
         self._robots = _Robots(
             robot,
@@ -155,6 +184,7 @@ class BalanceVectorEnv(gymnasium.vector.VectorEnv[Array, Array, NDArray[Any]]):
             jobs,
             population,
             {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "set": set},
+            engine,
         )
         self._limit = max_episode_steps
         self._now = 0

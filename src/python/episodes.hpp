@@ -10,12 +10,11 @@
 #include <atomic>
 
 #include "app/sim/workers.hpp"
+#include "python/python_engine.hpp"
 #include "python/simulation.hpp"
 #include "robots/lanes/roll.hpp"
 
 namespace equipoise::python {
-
-namespace nb = nanobind;
 
 using Array = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>;
 
@@ -23,11 +22,18 @@ class Episodes {
  public:
   /// A tick upright is worth 1, less the squares of the weighted observation and those of the action times
   /// `action_cost`, down to 0; where the robot is lost it is worth nothing.
+  /// `engine`: as PythonEngine has it, for bodies that are not ours; None: our own.
   Episodes(const app::SimRequest& request, int count, int jobs, std::vector<double> weights,
-           double action_cost)
+           double action_cost, const nb::object& engine)
       : request_(request),
+        engine_(
+            engine.is_none()
+                ? Simulated::MakeEngine{}
+                : [this, engine](
+                      const nlohmann::json&
+                          dimensions) { return std::make_unique<PythonEngine>(engine, dimensions, &guarded_); }),
         robot_(simulated(robot_type(request.config))),
-        make_((app::check(request), robot_.episodes(request))),
+        make_((app::check(request), robot_.episodes(request, engine_))),
         episodes_(static_cast<std::size_t>(count)),
         weights_(std::move(weights)),
         action_cost_(action_cost),
@@ -64,8 +70,7 @@ class Episodes {
     if (seeds.size() != which.size() || (!numbers.empty() && numbers.size() != which.size()))
       throw nb::value_error("every episode that is reset has a seed, and a robot or none has");
     for (const int i : which) (void)at(i);
-    const nb::gil_scoped_release others;
-    workers_.each(static_cast<int>(which.size()), [&](int job) {
+    each(static_cast<int>(which.size()), [&](int job) {
       const auto k = static_cast<std::size_t>(job);
       at(which[k]) = (numbers.empty() ? make_ : makes(numbers[k]))(seeds[k]);
       at(which[k])->observation(row(which[k]));
@@ -74,12 +79,10 @@ class Episodes {
       lost_[i] = false;
       active_[i] = true;
     });
-    workers_.start(groups(), roll_);
   }
   /// Those that are active, by their actions, which are limited to -1 .. 1; how many of them are lost.
   int step(const Array& actions) {
     check(actions);
-    const nb::gil_scoped_release others;
     std::atomic<int> losses{0};
     const auto one = [&](int i) {
       const auto k = static_cast<std::size_t>(i);
@@ -104,10 +107,9 @@ class Episodes {
       active_[k] = false;
       ++losses;
     };
-    workers_.each(count(), [&](int i) {
+    each(count(), [&](int i) {
       if (active_[static_cast<std::size_t>(i)]) one(i);
     });
-    workers_.start(groups(), roll_);
     return losses;
   }
   StateView truth(int i) { return at(i)->truth(); }
@@ -120,7 +122,18 @@ class Episodes {
     app::SimRequest request = request_;
     request.robot = number;
     app::check(request);
-    return robot_.episodes(request);
+    return robot_.episodes(request, engine_);
+  }
+  /// On all threads; engines in Python one by one, under its lock.
+  void each(int jobs, const std::function<void(int)>& job) {
+    if (engine_) {
+      for (int i = 0; i < jobs; ++i) job(i);
+      guarded_.rethrow();
+    } else {
+      const nb::gil_scoped_release others;
+      workers_.each(jobs, job);
+      workers_.start(groups(), roll_);
+    }
   }
   int width() const { return width_; }
   int groups() const { return (count() + kRobotsTogether - 1) / kRobotsTogether; }
@@ -151,6 +164,8 @@ class Episodes {
   }
 
   app::SimRequest request_;
+  Guarded guarded_;
+  Simulated::MakeEngine engine_;
   const Simulated& robot_;
   Make make_;
   int width_ = static_cast<int>(robot_.observation_names().size());

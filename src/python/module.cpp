@@ -13,18 +13,20 @@
 
 #include "app/design/analysis.hpp"
 #include "app/text/errors.hpp"
+#include "app/text/reasons.hpp"
 #include "app/text/version.hpp"
 #include "equipoise/config.hpp"
 #include "python/episodes.hpp"
+#include "python/python_engine.hpp"
 
 namespace equipoise::python {
 
 namespace {
 
 /// Ctrl-C, and who wants to know how far a run is: now and then, by the wall clock.
-class Attention {
+class Attention : public Guarded {
  public:
-  Attention(nb::object progress, std::atomic<bool>* stop) : progress_(std::move(progress)), stop_(*stop) {}
+  Attention(nb::object progress, std::atomic<bool>* stop) : Guarded(stop), progress_(std::move(progress)) {}
 
   void at(double t_s) {
     if (++ticks_ % kTicksBetween != 0 || Clock::now() < next_) return;
@@ -36,26 +38,11 @@ class Attention {
       keep([&] { progress_(t_s); });
     }
   }
-  /// f(), called where nothing may be thrown: what it throws ends the run and is thrown after it.
-  template <class F>
-  void keep(F&& f) {
-    try {
-      f();
-    } catch (...) {
-      if (!failure_) failure_ = std::current_exception();
-      stop_ = true;
-    }
-  }
-  void rethrow() {
-    if (failure_) std::rethrow_exception(failure_);
-  }
 
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr int kTicksBetween = 64;
   nb::object progress_;
-  std::atomic<bool>& stop_;
-  std::exception_ptr failure_;
   int ticks_ = 0;
   Clock::time_point next_ = Clock::now();
 };
@@ -126,52 +113,6 @@ nb::tuple run(app::SimRequest request, const nb::object& controller, const nb::o
   attention.rethrow();
   return nb::make_tuple(json, recorder ? nb::object(columns_of(*recorder)) : nb::none());
 }
-
-/// An engine in Python: `start` and `step` read `in` and fill `out`.
-class PythonEngine : public Engine {
- public:
-  /// make(dimensions as JSON, in, out) -> (start, step)
-  PythonEngine(const nb::object& make, const nlohmann::json& dimensions, Attention* attention)
-      : attention_(*attention) {
-    const auto view = [](auto& numbers) {  // not a copy
-      return nb::cast(nb::ndarray<nb::numpy, double, nb::ndim<1>>(numbers.data(), {numbers.size()}),
-                      nb::rv_policy::reference);
-    };
-    const nb::tuple both = nb::cast<nb::tuple>(make(dimensions.dump(), view(in_), view(out_)));
-    start_ = both[0];
-    step_ = both[1];
-  }
-  void start(const Mat3& R_WB, EngineMotion* motion) override {
-    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out_.data()) = R_WB;
-    start_();
-    read(motion);
-  }
-  void step(const Vec3& torque, const Vec2& push_W_N, const Vec2& drag_W_N, EngineMotion* motion) override {
-    Eigen::Map<Vec<7>> in(in_.data());
-    in.head<3>() = torque;
-    in.segment<2>(3) = push_W_N;
-    in.tail<2>() = drag_W_N;
-    attention_.keep([this] { step_(); });
-    read(motion);
-  }
-
- private:
-  void read(EngineMotion* m) const {
-    const double* at = out_.data();
-    m->R_WB = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(at);
-    at += 9;
-    for (Vec3* v : {&m->omega_B_rad_s, &m->specific_force_B_m_s2, &m->joint_rate_rad_s, &m->position_W_m,
-                    &m->velocity_W_m_s}) {
-      *v = Eigen::Map<const Vec3>(at);
-      at += 3;
-    }
-  }
-
-  Attention& attention_;
-  std::array<double, 7> in_{};    // joint torques (3), push (2), force on ball or axle (2)
-  std::array<double, 24> out_{};  // R_WB by rows, then the vectors of EngineMotion
-  nb::object start_, step_;
-};
 
 std::string run_in_engine(app::SimRequest request, const nb::object& make) {
   app::check(request);
@@ -331,6 +272,8 @@ NB_MODULE(_core, m) {
       },
       nb::arg("config"), nb::arg("set"), nb::arg("estimator"), nb::arg("controller"), nb::arg("last_hz"),
       nb::arg("step_hz"), nb::arg("bode"), "the design as JSON");
+  m.def("reason_names", &app::reason_names, nb::arg("reasons"), "of the bits of safety's reasons");
+  m.def("degraded_names", &app::degraded_names, nb::arg("degraded"));
   m.def(
       "estimators", [](const std::string& type) { return simulated(type).estimators(); }, nb::arg("robot"));
   m.def(
@@ -345,8 +288,9 @@ NB_MODULE(_core, m) {
         nb::arg("accel"), nb::arg("encoders"), nb::arg("battery"), nb::arg("attitude"),
         "per sample: gyro (3), accelerometer (3), attitude (3), battery, wheel angles");
   nb::class_<Episodes>(m, "Episodes", "Robots that are stepped together.")
-      .def(nb::init<const app::SimRequest&, int, int, std::vector<double>, double>(), nb::arg("request"),
-           nb::arg("count"), nb::arg("jobs"), nb::arg("weights"), nb::arg("action_cost"))
+      .def(nb::init<const app::SimRequest&, int, int, std::vector<double>, double, nb::object>(),
+           nb::arg("request"), nb::arg("count"), nb::arg("jobs"), nb::arg("weights"), nb::arg("action_cost"),
+           nb::arg("engine").none(), "engine: as run_in_engine's make, one by one on the caller's thread")
       .def_prop_ro("count", &Episodes::count)
       .def_prop_ro("wheels", &Episodes::wheels)
       .def_prop_ro("observations", &Episodes::observations)

@@ -111,17 +111,21 @@ class SimulatedOf : public Simulated {
     return out;
   }
 
-  std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request) const override {
+  std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request,
+                                                                  const MakeEngine& make) const override {
     const std::shared_ptr<const app::ConfiguredRobot> robot = app::load_for(&request);
     const Config config = Firmware::apply(static_cast<const Configured&>(*robot).config, request.choice);
-    return [request, robot, config](std::uint64_t seed) {
+    return [request, robot, config, make](std::uint64_t seed) {
       app::SimRequest seeded = request;
       seeded.seed = seed;
-      return Firmware::with_pipeline(config, seeded.choice.controller, [&](auto& own) {
-        using Own = std::decay_t<decltype(own)>;
-        return std::unique_ptr<Episode>(
-            std::make_unique<EpisodeOf<Own>>(*robot, config, seeded, own.params()));
-      });
+      return Firmware::with_pipeline(
+          config, seeded.choice.controller, [&](auto& own) -> std::unique_ptr<Episode> {
+            using Own = std::decay_t<decltype(own)>;
+            if (make)
+              return std::make_unique<EpisodeOf<Own, EngineEpisode>>(*robot, config, seeded, own.params(),
+                                                                     make);
+            return std::make_unique<EpisodeOf<Own, RollingEpisode>>(*robot, config, seeded, own.params());
+          });
     };
   }
 
@@ -206,20 +210,37 @@ class SimulatedOf : public Simulated {
     const World& world() const noexcept { return world_.world; }
 
    protected:
+    using EpisodeWorld = Ahead<World>;
     RollingEpisode(const Config& config, const app::SimRequest& request)
         : world_(config, request.choice, request.seed) {}
     virtual const MotorCommand* next_command() const noexcept = 0;
 
-    app::WorldOf<Firmware, Ahead<World>> world_;
+    app::WorldOf<Firmware, EpisodeWorld> world_;
+  };
+
+  class EngineEpisode : public Episode {
+   protected:
+    using EpisodeWorld = typename Firmware::EngineWorld;
+
+    EngineEpisode(const Config& config, const app::SimRequest& request, const MakeEngine& make)
+        : params_(config.world[fidelity_level(request.choice.fidelity)]),
+          engine_((params_.common.seed = request.seed, make(Access::dimensions(config.robot, params_)))),
+          world_(config, std::tie(config.robot, config.motor, config.calibration, params_, *engine_)) {}
+    virtual const MotorCommand* next_command() const noexcept = 0;
+
+    std::decay_t<decltype(Config::world[0])> params_;
+    std::unique_ptr<Engine> engine_;
+    app::WorldOf<Firmware, EpisodeWorld> world_;
   };
 
   /// Stands up under its own feedback; from then on the action takes its place.
-  template <class Own>
-  class EpisodeOf : public RollingEpisode {
+  template <class Own, class Base>
+  class EpisodeOf : public Base {
    public:
+    template <class... Made>
     EpisodeOf(const app::ConfiguredRobot& robot, const Config& config, const app::SimRequest& request,
-              const typename Own::Params& params)
-        : RollingEpisode(config, request),
+              const typename Own::Params& params, const Made&... made)
+        : Base(config, request, made...),
           kinematics_(config.robot),
           firmware_(app::hooked<Own>(params,
                                      [this](const Reference& r, const app::OwnFeedback<Robot>& own) -> Input {
@@ -250,7 +271,7 @@ class SimulatedOf : public Simulated {
     const MotorCommand* next_command() const noexcept override { return run_.next_command(); }
 
    private:
-    using RollingEpisode::world_;
+    using Base::world_;
 
     static app::SimOptions options_of(const app::ConfiguredRobot& robot, const app::SimRequest& request) {
       app::SimOptions options = app::options_for(request, robot);
@@ -262,7 +283,7 @@ class SimulatedOf : public Simulated {
     Reference reference_{};
     Input u_ = Input::Zero();
     bool acts_ = false;
-    app::FirmwareOf<Firmware, app::Hooked<Own>, Ahead<World>> firmware_;
+    app::FirmwareOf<Firmware, app::Hooked<Own>, typename Base::EpisodeWorld> firmware_;
     app::TickObserver observe_;
     std::atomic<bool> stop_{false};
     app::SimulatedRun run_;

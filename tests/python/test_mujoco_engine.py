@@ -9,19 +9,18 @@ import pytest
 mujoco = pytest.importorskip(
     "mujoco", reason="mujoco is not installed (tools/test installs tools/requirements-optional.txt)"
 )
-from equipoise_robot import _core  # noqa: E402
-from equipoise_tools import mjcf, mujoco_engine  # noqa: E402
+from equipoise_robot import models  # noqa: E402
+from equipoise_robot.engine import Engine  # noqa: E402
+from equipoise_tools import mujoco_engine  # noqa: E402
 
 K1 = 0.12  # [T] Table 3.2: torque of a wheel per unit of u
 
 
 def engine_of(robot, **changes):
     """The typical robot on a level floor, and its inputs and outputs."""
-    request = _core.Request()
-    request.config = str(mjcf.repository_root() / mjcf.FILES[robot][0])
-    dimensions = json.loads(_core.dimensions(request)) | changes
+    dimensions = models.dimensions(robot)[1] | changes
     inputs, outputs = np.zeros(7), np.zeros(24)
-    engine = mujoco_engine.Engine(mjcf.BY_TYPE[robot](dimensions, mjcf.Floor()), inputs, outputs)
+    engine = Engine(models.mjcf(robot, dimensions), inputs, outputs)
     return engine, inputs, dimensions
 
 
@@ -39,14 +38,7 @@ def exact(root, tmp_path, robot, row):
     return np.array(json.loads(done.stdout)["rows"][0]["qdd"])
 
 
-@pytest.mark.parametrize("robot", mjcf.FILES)
-def test_the_committed_model_is_the_configured_robot(root, robot):
-    assert (root / mjcf.FILES[robot][1]).read_text() == mjcf.typical(
-        robot
-    ), "run python -m equipoise_tools.mjcf"
-
-
-@pytest.mark.parametrize("robot", mjcf.FILES)
+@pytest.mark.parametrize("robot", models.ROBOTS)
 def test_a_dropped_robot_falls_freely(robot):
     engine, _, dimensions = engine_of(robot)
     tilted(engine, 0.0)
@@ -55,11 +47,11 @@ def test_a_dropped_robot_falls_freely(robot):
         engine.step()
     fell = 1.0 - (engine.position[2] - dimensions.get("ball_radius_m", dimensions.get("wheel_radius_m")))
     steps = 200 * dimensions["step_s"]
-    assert fell == pytest.approx(0.5 * mjcf.G * steps**2, rel=0.01)
+    assert fell == pytest.approx(0.5 * models.G * steps**2, rel=0.01)
     assert np.abs(engine.force).max() < 1e-6  # an accelerometer feels nothing
 
 
-@pytest.mark.parametrize("robot", mjcf.FILES)
+@pytest.mark.parametrize("robot", models.ROBOTS)
 def test_a_falling_robot_keeps_its_energy(robot):
     engine, _, _ = engine_of(robot)
     engine.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
@@ -139,3 +131,58 @@ def test_a_twin_shows_what_detection_did(root):
         mujoco_engine.judged(trial, str(root / "config/mbbr.toml"), [], twins=False)["saved_by_detector"]
         is None
     )
+
+
+def environment(robot, **options):
+    gymnasium = pytest.importorskip("gymnasium")
+    return gymnasium.make(f"equipoise_robot:Equipoise-{robot.capitalize()}-v0", engine="mujoco", **options)
+
+
+@pytest.mark.parametrize("robot", models.ROBOTS)
+def test_an_environment_on_mujoco_passes_gymnasiums_check(robot):
+    from gymnasium.utils.env_checker import check_env
+
+    env = environment(robot)
+    check_env(env.unwrapped)
+    first, again = env.reset(seed=3)[0], env.reset(seed=3)[0]
+    np.testing.assert_array_equal(first, again)
+    assert (env.reset(seed=4)[0] != first).any()
+
+
+@pytest.mark.parametrize("engine", ["own", "mujoco"])
+@pytest.mark.parametrize("robot", models.ROBOTS)
+def test_a_policy_crosses_engines(root, robot, engine):
+    """LQR by the design's gains: upright for 3 s in both, and without it in neither."""
+    from equipoise_robot.envs import BalanceVectorEnv
+    from equipoise_tools.speed import standing_policy
+
+    envs = BalanceVectorEnv(robot, num_envs=2, engine=engine)
+    gains = standing_policy(root, robot, envs.observation_names)
+    observation, _ = envs.reset(seed=1)
+    for _ in range(600):
+        observation, _, lost, _, _ = envs.step(observation @ gains.T)
+        assert not lost.any()
+    for _ in range(300):
+        *_, lost, _, _ = envs.step(np.zeros((2, gains.shape[0])))
+        if lost.any():
+            break
+    assert lost.any()
+
+
+def test_the_environments_bodies_are_mujocos(monkeypatch):
+    """What the engine raises ends the step and is raised; the next reset begins anew."""
+    from equipoise_robot import UserError, engine
+    from equipoise_robot.envs import BalanceEnv
+
+    env = environment("mbbr")
+    env.reset(seed=1)
+    rest = np.zeros(3)
+    env.step(rest)
+    monkeypatch.setattr(engine.Engine, "read", lambda self: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        env.step(rest)
+    monkeypatch.undo()
+    env.reset(seed=1)
+    env.step(rest)
+    with pytest.raises(UserError, match="engine: 'bullet' is none; they are own, mujoco"):
+        BalanceEnv("mbbr", engine="bullet")
