@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
 from .paths import UserError, repository_root
-from .planar_model import STEP_S, Motion, wheel_axes
+from .planar_model import STEP_S, Motion
 
 UNITS = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180, "rev": 2 * np.pi,
@@ -43,6 +43,20 @@ def configuration(path: Path, settings: list[str] | None = None) -> dict[str, di
         table, _, key = name.rpartition(".")
         tables.setdefault(table, {})[key] = value
     return tables
+
+
+def geometry(robot: dict[str, Any], axes: np.ndarray | None = None) -> dict[str, Any]:
+    """Of a ball-bot's [robot], as the firmware has it; with measured axes also how they differ."""
+    command = [str(repository_root() / "build/host/equipoise"), "geometry", "--json", "-"]
+    command += ["--alpha-deg", str(robot["wheel_latitude_deg"])]
+    command += ["--azimuth-deg", str(robot["wheel_azimuth_deg"])]
+    if robot.get("wheel_tilt_deg", "orthogonal") != "orthogonal":
+        command += ["--tilt-deg", str(robot["wheel_tilt_deg"])]
+    if axes is not None:
+        command += ["--axes", *(f"{value:.9g}" for value in axes.T.ravel())]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
 
 
 def read_table(path: Path, shape: dict[str, Any]) -> pd.DataFrame:
@@ -142,7 +156,7 @@ def motion(table: Path, map_file: Path) -> tuple[Motion, dict[str, dict[str, Any
     wheels = linear(wheels)
     if config["robot"]["type"] == "mbbr":
         ratio = config["robot"]["ball_radius_m"] / config["robot"]["wheel_radius_m"]
-        axes = wheel_axes(config)
+        axes = np.array(geometry(config["robot"])["T_ob"])
         phi, u = (np.linalg.inv(axes.T) @ wheels / ratio)[:2], (ratio * axes @ held)[:2]
     else:
         phi, u = wheels.mean(axis=0, keepdims=True), held.mean(axis=0, keepdims=True)

@@ -76,21 +76,6 @@ def of_configuration(config: dict) -> Planar:
     )  # fmt: skip
 
 
-def wheel_axes(config: dict) -> np.ndarray:
-    """Columns: axes of a ball-bot's wheels in body axes, [T] (2.3)-(2.5)."""
-    r = config["robot"]
-    latitude, azimuth = np.radians(r["wheel_latitude_deg"]), np.radians(r["wheel_azimuth_deg"])
-    tilt = np.arccos(1 / (np.sqrt(3) * np.sin(latitude)))
-    if r.get("wheel_tilt_deg", "orthogonal") != "orthogonal":
-        tilt = np.radians(r["wheel_tilt_deg"])
-    columns = []
-    for i in range(3):
-        a = azimuth + 2 * np.pi / 3 * i
-        rising = np.array([np.cos(latitude) * np.cos(a), np.cos(latitude) * np.sin(a), np.sin(latitude)])
-        columns.append(np.cos(tilt) * rising - np.sin(tilt) * np.array([-np.sin(a), np.cos(a), 0.0]))
-    return np.array(columns).T
-
-
 @dataclass(frozen=True)
 class Motion:
     """A log on a grid of STEP_S: one row per axis that it balances about."""
