@@ -147,13 +147,21 @@ def test_odometry_is_the_estimate_with_x_forward(log, robot, messages):
     assert truth == pytest.approx(at, abs=0.05)
 
 
-def test_the_robots_description_has_the_joints_and_frames(messages, tmp_path):
+def test_the_robots_description_has_the_joints_and_frames(robot, messages, tmp_path):
     yourdfpy = pytest.importorskip("yourdfpy", reason=OPTIONAL)
     (_, description), (_, static) = messages["/robot_description"][0], messages["/tf_static"][0]
     path = tmp_path / "robot.urdf"
     path.write_text(description.data)
     urdf = yourdfpy.URDF.load(path)
     assert set(messages["/joint_states"][0][1].name) <= set(urdf.joint_map)
+    # The ball does not spin: who turns left has wheels that turn left on it (MBBR), or the right one ahead.
+    joints = messages["/joint_states"][-1][1]
+    axes = [urdf.get_transform(n, "base_link")[:3, :3] @ urdf.joint_map[n].axis for n in joints.name]
+    turned = joints.position - messages["/joint_states"][0][1].position
+    if robot == "mbbr":
+        assert turned @ np.array(axes)[:, 2] > 1.0
+    else:
+        assert joints.name == ["right", "left"] and turned[0] > turned[1] + 1.0
     for frame in static.transforms:
         expected = urdf.get_transform(frame.child_frame_id, frame.header.frame_id)
         assert turns([frame.transform.rotation]).as_matrix()[0] == pytest.approx(expected[:3, :3], abs=1e-6)
