@@ -1,6 +1,7 @@
 """The report finds in a known log what was put there, and draws it."""
 
 import base64
+import json
 import os
 import re
 import subprocess
@@ -239,3 +240,43 @@ def test_nobody_complains_when_the_output_is_not_read_on(module, known_log, tmp_
     os.close(end)
     assert ended.stderr == ""
     assert ended.returncode in (0, 141)
+
+
+def test_what_if_shows_a_changed_tuning_beside_the_run(root, tmp_path, capsys):
+    """An encoder dies and is excluded; without detection it would not have been."""
+    log = tmp_path / "run.lcm"
+    run = [root / "build/host/equipoise", "run", "--backend", "sim", "--config", root / "config/mbbr.toml"]
+    run += ["--telemetry", "off", "--speed", "50", "--arm", "--duration-s", "6", "--log", log]
+    ran = subprocess.run([*map(str, run), "--fault", "encoder_dead@3"], capture_output=True, check=False)
+    assert log.exists(), ran.stderr
+    noise = "estimator.ekf.r=[2.08e-6, 2.08e-6, 2.08e-6, 8e-5, 8e-5, 8e-5, 1.41, 1.41]"
+    changes = ["safety.detection=false", noise]
+    asked = [str(log), "--out", str(tmp_path / "out")]
+    assert report.main([*asked, *(word for change in changes for word in ("--set", change))]) == 0
+    recorded, changed = capsys.readouterr().out.split(", ".join(changes))
+    assert "without wheel" in alarms_in(recorded) and "without wheel" not in alarms_in(changed)
+
+    was, beside = read_log(log), read_log(tmp_path / "out/what-if.lcm")
+    assert beside.run.backend == "replay"
+    for channel in (names.SENSORS, names.COMMAND):
+        assert (was[channel] == beside[channel]).all()
+    command = [root / "build/host/equipoise", "replay", log, "--json", "-"]
+    command += [word for change in changes for word in ("--set", change)]
+    said = json.loads(subprocess.run(list(map(str, command)), capture_output=True, check=True).stdout)
+    for each, column in ((was, "recorded"), (beside, "changed")):  # counted from 5 s on
+        nis = each[names.STATE]["normalized_innovation"]
+        mean = said["retuned"][column]["normalized_innovation_mean"]
+        assert nis[1000:].mean() == pytest.approx(mean, rel=1e-12)
+        assert summarise(each).nis_mean == pytest.approx(nis[was[names.HEALTH]["arm_state"] == 1].mean())
+    assert said["retuned"]["recorded"] != said["retuned"]["changed"]
+    page = (tmp_path / "out/report.html").read_text()
+    assert "The second column is no run" in page and "Normalised innovation" in page
+
+    assert report.main([*asked, "--set", "safety.detecton=false"]) == 2
+    assert report.main([str(log), *asked, "--set", changes[0]]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2 and "safety.detecton" in said[0] and "--set: takes one log" in said[1]
+
+
+def alarms_in(text):
+    return next(line for line in text.splitlines() if line.startswith("alarms:"))

@@ -127,6 +127,11 @@ def plots_of(run: Run, compared: bool) -> list[Plot]:
                 ],
             )
         )
+    if names.STATE in log:
+        nis, t_s = log[names.STATE]["normalized_innovation"], log.seconds(names.STATE)
+        plots.append(
+            Plot("Normalised innovation (NIS)", "1: as expected", [Series("NIS", t_s, nis, style.ESTIMATE)])
+        )
     if names.HEALTH in log:
         t_s = log.seconds(names.HEALTH)
         plots.append(

@@ -50,6 +50,8 @@ class Summary:
     battery_V: tuple[float, float] | None = None  # lowest, mean
     estimators: dict[str, Errors] = field(default_factory=dict)
     events: list[tuple[float, str]] = field(default_factory=list)
+    nis_mean: float | None = None  # while armed; 1 when the noise is as the filter believes
+    alarms: list[tuple[float, str, int]] | None = None  # first, what, ticks
 
 
 def run_record(log: Log):
@@ -140,6 +142,25 @@ def safety_events(log: Log) -> list[tuple[float, str]]:
         words += names.bits(int(health["sensor_health"][i]), names.SENSOR_HEALTH)
         events.append((float(t_s[i]), ", ".join(words)))
     return events
+
+
+def alarms_of(log: Log) -> list[tuple[float, str, int]] | None:
+    """What was excluded, and what spoke against the motors once they had run."""
+    if names.HEALTH not in log:
+        return None
+    health, t_s = log[names.HEALTH], log.seconds(names.HEALTH)
+    asked = (health["reasons"] & 1 << names.SAFETY_REASONS.index("not requested")) == 0
+    ran = np.logical_or.accumulate(health["arm_state"] == names.ARM_STATES.index("armed"))
+    found = []
+    for bits, words in (
+        (health["degraded"], names.DEGRADED),
+        (np.where(asked & ran, health["reasons"], 0), names.SAFETY_REASONS),
+    ):
+        for i, word in enumerate(words):
+            at = np.flatnonzero(bits >> i & 1)
+            if at.size:
+                found.append((float(t_s[at[0]]), word, int(at.size)))
+    return sorted(found)
 
 
 def true_tilt_at(log: Log, ticks: np.ndarray) -> np.ndarray:
@@ -259,4 +280,9 @@ def summarise(log: Log) -> Summary:
             miss = truth["position_W_m"][counted] - reference["position_W_m"][counted]
             summary.position_rmse_m = rms(np.linalg.norm(miss, axis=1)) if miss.size else None
     summary.events = safety_events(log)
+    summary.alarms = alarms_of(log)
+    if names.HEALTH in log and names.STATE in log:
+        state, health = aligned(log, names.STATE, names.HEALTH)
+        armed = health["arm_state"] == names.ARM_STATES.index("armed")
+        summary.nis_mean = float(state["normalized_innovation"][armed].mean()) if armed.any() else None
     return summary

@@ -50,6 +50,11 @@ def number_rows(summary: Summary) -> list[tuple[str, str]]:
     if summary.duty_max is not None:
         rows.append(("largest duty", f"{summary.duty_max:.3f}"))
         rows.append(("ticks with a saturated motor", f"{100 * summary.saturated_fraction:.2f} %"))
+    if summary.nis_mean is not None:
+        rows.append(("normalised innovation, mean while armed", f"{summary.nis_mean:.3f}"))
+    if summary.alarms is not None:
+        said = "; ".join(f"{what} from {t_s:.2f} s, {ticks} ticks" for t_s, what, ticks in summary.alarms)
+        rows.append(("alarms", said or "none"))
     if summary.battery_V is not None:
         rows.append(
             ("battery, lowest and mean", f"{summary.battery_V[0]:.2f} V, {summary.battery_V[1]:.2f} V")
@@ -98,9 +103,11 @@ def _head(title: str) -> list[str]:
     ]
 
 
-def comparison(runs: list[Run], titles: list[str], pictures: list[bytes]) -> str:
+def comparison(runs: list[Run], titles: list[str], pictures: list[bytes], note: str = "") -> str:
     """Several logs: their numbers side by side, their plots over each other."""
     parts = _head("Comparison of " + ", ".join(run.name for run in runs))
+    if note:
+        parts.append(f'<p class="note">{escape(note)}</p>')
     parts += [
         f'<p class="note">{escape(run.name)}: {escape(note)}</p>' for run in runs for note in run.log.notes
     ]

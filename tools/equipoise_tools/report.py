@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from .figures import draw_report, headline
 from .interactive import UPLOT, Run
 from .metrics import Summary, summarise
 from .page import comparison, estimator_rows, number_rows, page
-from .paths import UserError
+from .paths import UserError, repository_root
 from .style import plt
 
 
@@ -37,11 +38,37 @@ def picture_of(run: Run) -> bytes:
     return picture.getvalue()
 
 
-def write_report(runs: list[Run], out: Path) -> list[Path]:
+WHAT_IF = (
+    "The second column is no run: another tuning got the samples and commands of the first, and its filter "
+    "what that run did to the motors. Its duty is what it would have asked for in the states of the first."
+)
+
+
+def what_if(log: Path, changes: list[str], out: Path) -> Path:
+    """The log of `equipoise replay --set`, in the folder."""
+    equipoise = repository_root() / "build/host/equipoise"
+    if not equipoise.exists():
+        raise UserError(f"{equipoise}: not built; run ./tools/run once")
+    changed = out / "what-if.lcm"
+    out.mkdir(parents=True, exist_ok=True)
+    command = [equipoise, "replay", log, "--log", changed, "--json", "/dev/null"]
+    for change in changes:
+        command += ["--set", change]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    if ran.returncode > 1:
+        raise UserError(ran.stderr.strip().removeprefix("equipoise: "))
+    if ran.returncode == 1:
+        print("note: this version's pipeline differs from the recorded one's; equipoise replay says where")
+    return changed
+
+
+def write_report(runs: list[Run], out: Path, note: str = "") -> list[Path]:
     """report.html and report.png in the folder; of a second log report-2.png, and so on."""
     pictures = [picture_of(run) for run in runs]
     titles = [headline(run.log, run.summary) for run in runs]
-    text = page(titles[0], runs[0], pictures[0]) if len(runs) == 1 else comparison(runs, titles, pictures)
+    text = (
+        page(titles[0], runs[0], pictures[0]) if len(runs) == 1 else comparison(runs, titles, pictures, note)
+    )
     paths = [out / ("report.png" if i == 0 else f"report-{i + 1}.png") for i in range(len(runs))]
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -72,13 +99,25 @@ def main(arguments: list[str] | None = None) -> int:
         help="an LCM event log written by equipoise; several are compared",
     )
     parser.add_argument("--out", metavar="DIR", type=Path, help="where to (default: the first log's folder)")
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="beside one log: what this tuning would have made of it, as equipoise replay --set",
+    )
     options = parser.parse_args(arguments)
+    out = options.out or options.logs[0].parent
     try:
+        if options.set and len(options.logs) > 1:
+            raise UserError("--set: takes one log")
+        shown = names_of(options.logs)
+        if options.set:
+            options.logs.append(what_if(options.logs[0], options.set, out))
+            shown.append(", ".join(options.set))
         logs = [read_log(path) for path in options.logs]
-        runs = [
-            Run(name, log, summarise(log)) for name, log in zip(names_of(options.logs), logs, strict=True)
-        ]
-        written = write_report(runs, options.out or options.logs[0].parent)
+        runs = [Run(name, log, summarise(log)) for name, log in zip(shown, logs, strict=True)]
+        written = write_report(runs, out, WHAT_IF if options.set else "")
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

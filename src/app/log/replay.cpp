@@ -10,6 +10,7 @@
 #include "app/text/errors.hpp"
 #include "equipoise/runtime/fields.hpp"
 #include "equipoise/runtime/loop.hpp"
+#include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -109,8 +110,40 @@ class LoggedSupervisor {
   const runtime::TickRecord& now_;
 };
 
-/// `follower`, where there is one: its record of the same tick into `retuned`.
-Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other, Firmware* follower) {
+/// What another tuning would have done, as a log: `replay` is its backend, for it was no run.
+class ChangedLog {
+ public:
+  ChangedLog(const std::string& path, runtime::RunInfo run) : telemetry_(options(path, std::move(run))) {}
+
+  void add(const runtime::TickRecord& recorded, runtime::TickRecord changed) {
+    changed.tick = recorded.tick;
+    changed.has_truth = recorded.has_truth;
+    changed.truth = recorded.truth;
+    telemetry_.hand_over(changed);
+    judge_.observe(judged(changed));
+  }
+  void finish() {
+    const auto report = telemetry_.finish(judge_.verdict(false, false).record());
+    if (!report.log_error.empty()) throw InputError(report.log_error);
+  }
+
+ private:
+  static runtime::TelemetryOptions options(const std::string& path, runtime::RunInfo run) {
+    runtime::TelemetryOptions out;
+    out.log_path = path;
+    out.wait_when_full = true;
+    out.run = std::move(run);
+    out.run.backend = kReplayBackend;
+    return out;
+  }
+
+  runtime::Telemetry telemetry_;
+  VerdictJudge judge_;
+};
+
+/// `follower`, where there is one: its record of the same tick into `retuned`, and into `changed`.
+Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other, Firmware* follower,
+              ChangedLog* changed) {
   Replay out;
   Retuned retuned;
   LoggedIo io(log);
@@ -129,6 +162,7 @@ Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other,
   const auto follow = [&](std::int64_t, std::int64_t, const RawSample&, const Command&,
                           const runtime::TickRecord& record) {
     if (settled(io.now())) compare_tunings(io.now(), record, &retuned);
+    if (changed != nullptr) changed->add(io.now(), record);
   };
   const auto on_tick = [&](std::int64_t, std::int64_t, const RawSample&, const Command&,
                            const runtime::TickRecord& record) {
@@ -258,11 +292,14 @@ Replay replay_as(const RobotType& robot, RunLog& log, const std::string& origin,
   if (beside.set.empty()) {
     choice.compare = !beside.estimator.empty();
     r = replay(log, *recorded->firmware(choice),
-               choice.compare ? index_of(robot, beside.estimator) : std::nullopt, nullptr);
+               choice.compare ? index_of(robot, beside.estimator) : std::nullopt, nullptr, nullptr);
   } else {
     const auto changed = robot.parse(info.config_toml, where, beside.set);
     const Retuning both = recorded->retuning(choice, *changed, asked);
-    r = replay(log, *both.recorded, std::nullopt, both.changed.get());
+    std::optional<ChangedLog> ticks;
+    if (!beside.log.empty()) ticks.emplace(beside.log, run_info(*changed, asked, info.seed));
+    r = replay(log, *both.recorded, std::nullopt, both.changed.get(), ticks ? &*ticks : nullptr);
+    if (ticks) ticks->finish();
   }
   r.safety = recorded->safety;
   if (r.ticks == 0) throw InputError(origin + ": holds no whole tick");

@@ -68,10 +68,14 @@ struct Replay {
   bool identical() const { return ticks > 0 && missing == 0 && !difference.found; }
 };
 
+/// RunInfo::backend of a log that `replay` wrote.
+inline constexpr const char* kReplayBackend = "replay";
+
 /// What runs beside the recorded run.
 struct Beside {
   std::string estimator;         // empty: none, or the recorded one
   std::vector<std::string> set;  // changes of the configuration, as of --set; empty: the recorded tuning
+  std::string log;               // of the changed tuning's ticks; empty: none
 };
 
 /// `origin` names the log in errors.

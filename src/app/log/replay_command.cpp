@@ -1,9 +1,12 @@
 // `equipoise replay`.
 #include <cstdio>
+#include <filesystem>
 
 #include "app/cli/commands.hpp"
 #include "app/log/replay.hpp"
 #include "app/log/shadow.hpp"
+#include "app/text/errors.hpp"
+#include "app/text/files.hpp"
 #include "app/text/json.hpp"
 #include "app/text/reasons.hpp"
 #include "app/text/version.hpp"
@@ -121,6 +124,15 @@ void print(std::FILE* out, const ReplayArguments& a, const runtime::RunInfo& run
   if (!a.beside.estimator.empty()) print(out, run, a.beside.estimator, r.other);
 }
 
+/// No log but one of its own kind is replaced.
+void check_log_output(const ReplayArguments& a) {
+  const std::string& path = a.beside.log;
+  if (path.empty() || !std::filesystem::exists(path)) return;
+  check_output(path, {"\xED\xA1\xDA\x01"}, "log");
+  if (RunLog(path).run().backend != kReplayBackend)
+    throw InputError("--log " + path + ": exists and is the log of a run; choose another name");
+}
+
 int run_shadow(RunLog& log, const ReplayArguments& a) {
   const Shadow shadow = shadow_log(log, a.log, a.config, a.beside.set);
   std::FILE* out = a.json == "-" ? stderr : stdout;
@@ -138,11 +150,15 @@ int run_shadow(RunLog& log, const ReplayArguments& a) {
 int run(const ReplayArguments& a) {
   RunLog log(a.log);
   log.show_progress("replay");
+  if (a.shadow && !a.beside.log.empty()) throw InputError("--log: not with --shadow, which writes none");
   if (a.shadow) return run_shadow(log, a);
   if (log.run().backend == "import") {
     throw InputError(a.log +
                      ": another robot's, imported; nothing of it is ours to compare with. Use --shadow");
   }
+  if (log.run().backend == kReplayBackend)
+    throw InputError(a.log + ": what another tuning would have done (replay --log); replay the run itself");
+  check_log_output(a);
   const Replay r = replay_log(log, a.log, a.beside);
   print(a.json == "-" ? stderr : stdout, a, log.run(), r);
   if (!a.json.empty()) write_json(to_json(a, log.run(), r), a.json);
@@ -158,8 +174,11 @@ void add_replay(Subcommand app) {
   command.option("log", a->log, "LCM event log of sim or run; its further parts are found").file().required();
   command.option("--estimator", a->beside.estimator,
                  "run this one beside it; errors against the log's truth");
-  command.option("--set", a->beside.set,
-                 "key=value: run this tuning beside it, e.g. noise or weights; may be repeated");
+  const Option set = command.option(
+      "--set", a->beside.set, "key=value: run this tuning beside it, e.g. noise or weights; may be repeated");
+  command.option("--log", a->beside.log, "with --set: log of what this tuning would have done")
+      .file()
+      .needs(set);
   const Option shadow = command.flag(
       "--shadow", a->shadow, "beside a robot that other software drove: alarms, NIS, tilt, prediction");
   command.option("--config", a->config, "with --shadow: this robot, in place of the log's")
