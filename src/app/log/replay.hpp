@@ -75,7 +75,7 @@ inline constexpr const char* kReplayBackend = "replay";
 struct Beside {
   std::string estimator;         // empty: none, or the recorded one
   std::vector<std::string> set;  // changes of the configuration, as of --set; empty: the recorded tuning
-  std::string log;               // of the changed tuning's ticks; empty: none
+  std::string log{};             // of the changed tuning's ticks; empty: none
 };
 
 /// `origin` names the log in errors.
