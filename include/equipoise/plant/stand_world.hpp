@@ -1,11 +1,10 @@
 // A robot on a soft stand, for practising calibration and bring-up: wheels turn freely, the body rocks on a
 // spring and kicks back, a hand may put it into other poses, and it may be wired wrongly.
-// In: motor command per tick -> out: raw samples. World supplies advance, sense, time_s. Simulation only;
+// In: motor command per tick -> out: raw samples. Simulation only;
 // allocates nothing after construction; same seed, same bytes.
 #pragma once
 
-#include "equipoise/plant/motors.hpp"
-#include "equipoise/plant/sensors.hpp"
+#include "equipoise/plant/ticked_world.hpp"
 
 namespace equipoise {
 
@@ -30,14 +29,14 @@ struct StandParams {
   Miswiring wiring;
 };
 
-class StandWorld {
+class StandWorld : public SimulatedDevices {
  public:
   StandWorld(const StandParams& stand, const MotorParameters& motor, const Calibration& calibration,
              const WorldParams& world);
 
-  void advance(const MotorCommand& command);
-  RawSample sense();
-  double time_s() const noexcept { return time_s_; }
+  void advance(const MotorCommand& command) override;
+  RawSample sense() override;
+  double time_s() const noexcept override { return time_s_; }
 
   /// A hand: body to world.
   void put(const Mat3& R_WB) noexcept { R_WB_ = R_WB; }

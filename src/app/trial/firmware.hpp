@@ -10,6 +10,7 @@
 #include "equipoise/actuate/safety.hpp"
 #include "equipoise/config.hpp"
 #include "equipoise/overrides.hpp"
+#include "equipoise/plant/ticked_world.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/sense/calibrate.hpp"
 #include "robots/common/choice.hpp"
@@ -21,19 +22,14 @@ using equipoise::Choice;
 using equipoise::fidelity_level;
 
 /// A simulated robot and its surroundings.
-class World {
+class World : public SimulatedDevices {
  public:
   World() = default;
   World(const World&) = delete;
   World& operator=(const World&) = delete;
-  virtual ~World() = default;
 
-  /// One tick with the bridges as commanded.
-  virtual void advance(const MotorCommand& command) = 0;
-  virtual RawSample sense() = 0;
   /// No packets of the attitude source, where nobody reads them.
   virtual void without_attitude() noexcept = 0;
-  virtual double time_s() const noexcept = 0;
   /// With the dimensions that the firmware is configured with.
   virtual StateView truth() const noexcept = 0;
 };

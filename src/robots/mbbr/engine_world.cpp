@@ -1,6 +1,5 @@
-#include "robots/mbbr/engine_world.hpp"
-
 #include "equipoise/plant/coulomb.hpp"
+#include "robots/mbbr/world.hpp"
 
 namespace equipoise {
 

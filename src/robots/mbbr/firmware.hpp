@@ -7,7 +7,6 @@
 
 #include "robots/common/firmware.hpp"
 #include "robots/mbbr/config.hpp"
-#include "robots/mbbr/engine_world.hpp"
 #include "robots/mbbr/world.hpp"
 
 namespace equipoise {

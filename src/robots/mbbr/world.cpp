@@ -48,19 +48,16 @@ MbbrParameters without_loose_wheels(MbbrParameters p, const MbbrDriveParams& dri
 
 MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
                      const Calibration& calibration, const MbbrWorldParams& world)
-    : robot_(as_built(robot, world.common.actual)),
+    : TickedWorld(motor, calibration, world.common),
+      robot_(as_built(robot, world.common.actual)),
       world_(world),
       kinematics_(robot_),
       dynamics_(robot_),
       mobility_(dynamics_.relative_mobility()),
-      motors_(motor, calibration, world.common),
       drive_(robot_, with_offset(world)),
       floor_(robot_, world.floor),
       loose_(without_loose_wheels(robot_, world.drive), world.floor),
       ground_(world.common.floor, robot_.r, world.common.seed),
-      start_noise_(world.common.seed, kStartNoise),
-      process_noise_(world.common.seed, kProcessNoise),
-      loop_noise_(world.common.seed, kLoop),
       s_(start_state(start_noise_, world.common.initial_tilt_rad)),
       here_(s_),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)),
@@ -88,18 +85,18 @@ Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& r
 Vec2 MbbrWorld::pull_star(const Instant& now) const noexcept {
   Vec2 pull = Vec2::Zero();
   const double weight_N = (robot_.m_t + robot_.m_b) * kGravity_m_s2;
-  const Vec2& slope = world_.common.floor_slope_rad;
+  const Vec2& slope = common_.floor_slope_rad;
   if (!slope.isZero(0.0)) pull = now.heading.back(-weight_N * slope);
   if (uneven_) pull += (robot_.m_t + robot_.m_b) * now.heading.back(ground_.pull_W_m_s2());
-  if (world_.common.rolling_resistance != 0.0) {
+  if (common_.rolling_resistance != 0.0) {
     const Vec2 v = ball_velocity(robot_.r, now.motion.phi_dot_star);
-    pull -= world_.common.rolling_resistance * weight_N * v / std::max(v.norm(), kRollingStart_m_s);
+    pull -= common_.rolling_resistance * weight_N * v / std::max(v.norm(), kRollingStart_m_s);
   }
   return pull;
 }
 
 double MbbrWorld::viscous_N_m_s() const noexcept {
-  return world_.common.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
+  return common_.friction ? robot_.mu_v + world_.extra_viscous_N_m_s : 0.0;
 }
 
 void MbbrWorld::push_and_pull(Instant* now, const Vec2& push_W) const noexcept {
@@ -134,15 +131,15 @@ MbbrWorld::State MbbrWorld::slip_derivative(const State& s, const Here& now,
 }
 
 Vec3 MbbrWorld::friction_limit_B(const Instant& now) const noexcept {
-  if (!world_.common.friction) return Vec3::Zero();
-  return friction_limit_N_m(world_, robot_.mu_c * world_.common.friction_now(time_s_), now.relative_B);
+  if (!common_.friction) return Vec3::Zero();
+  return friction_limit_N_m(world_, robot_.mu_c * common_.friction_now(time_s_), now.relative_B);
 }
 
 /// Per axis, the constant torque that would end this step at rest, limited to friction's: sticking and
 /// sliding in one rule.
 Vec3 MbbrWorld::coulomb_torque_B(const Instant& free) const noexcept {
-  if (!world_.common.friction) return Vec3::Zero();
-  const double h = world_.common.step_s;
+  if (!common_.friction) return Vec3::Zero();
+  const double h = common_.step_s;
   return uncoupled_coulomb_torque<double, 3>(free.relative_after(h), mobility_, h, friction_limit_B(free));
 }
 
@@ -166,11 +163,10 @@ MbbrFriction MbbrWorld::slip_friction(const Vec2& push_W, double h) const noexce
   Vec<6> rates;
   rates << near(next).relative_B, next.segment<3>(kSlip);
   const double coulomb =
-      world_.common.friction ? robot_.mu_c * world_.coulomb_scale * world_.common.friction_now(time_s_) : 0.0;
-  return loose_.friction(
-      free.motion, mass, rates, h, drive_.share_beyond() * friction_limit_B(free),
-      drive_.rotors(motors_, rotor_rad_s_, coulomb, world_.common.stiction, viscous_N_m_s(), h),
-      needed(free, felt_as_rolling(a, robot_.r)).normal_N);
+      common_.friction ? robot_.mu_c * world_.coulomb_scale * common_.friction_now(time_s_) : 0.0;
+  return loose_.friction(free.motion, mass, rates, h, drive_.share_beyond() * friction_limit_B(free),
+                         drive_.rotors(motors_, rotor_rad_s_, coulomb, common_.stiction, viscous_N_m_s(), h),
+                         needed(free, felt_as_rolling(a, robot_.r)).normal_N);
 }
 
 /// While everything rolls: does it stay so?
@@ -237,6 +233,7 @@ MbbrSlipAccelerations MbbrWorld::slip_accelerations(const Here& here, const Vec2
 }
 
 void MbbrWorld::step(double h) noexcept {
+  rolled_ = false;
   if (uneven_) {
     const Vec2 slip = s_.segment<2>(kSlip);
     ground_.begin_step(ball_velocity(robot_.r, Vec2(s_.segment<2>(kPhi))),
@@ -289,45 +286,12 @@ void MbbrWorld::slip(const Vec2& push, double h) noexcept {
   time_s_ += h;
 }
 
-void MbbrWorld::advance(const MotorCommand& command) {
-  advance_tick(command);
-  const double missed = world_.common.missed_tick_share;
-  if (missed > 0.0 && loop_noise_.uniform(0.0, 1.0) < missed) advance_tick(command);
-}
-
-void MbbrWorld::advance_tick(const MotorCommand& command) {
-  if (command.enable) held_ = false;
-  rolled_ = false;
-  const double h = world_.common.step_s;
-  const int steps = steps_per_tick();
-  const double taken_at = world_.common.actuation_steps();
-  for (int i = 0; i < steps && !held_; ++i) {
-    const double part = taken_at - i;
-    if (part > 0.0 && part < 1.0) {  // the PWM takes the duty within this step
-      step(part * h);
-      motors_.command(command);
-      step((1.0 - part) * h);
-    } else {
-      if (part == 0.0) motors_.command(command);
-      step(h);
-    }
-  }
-  if (held_) {
-    time_s_ += kTickS;
-    motors_.update_battery(kinematics_.wheels_from_ball(here_.relative_B));
-  } else {
-    end_tick();
-  }
-}
-
 void MbbrWorld::end_tick() noexcept {
-  disturb();
-  here_ = Here(s_);  // anew once a tick: what a step adds is exact but for the last digit
+  if (!held_) {
+    disturb();
+    here_ = Here(s_);  // anew once a tick: what a step adds is exact but for the last digit
+  }
   motors_.update_battery(kinematics_.wheels_from_ball(here_.relative_B));
-}
-
-int MbbrWorld::steps_per_tick() const noexcept {
-  return static_cast<int>(std::lround(kTickS / world_.common.step_s));
 }
 
 bool MbbrWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexcept {
@@ -338,7 +302,7 @@ bool MbbrWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexc
   robot->bodies = bodies(robot_);
   Eigen::Map<Vec3>(robot->mobility) = mobility_;
   robot->viscous_N_m_s = viscous_N_m_s();
-  robot->coulomb_N_m = world_.common.friction ? robot_.mu_c * world_.coulomb_scale : 0.0;
+  robot->coulomb_N_m = common_.friction ? robot_.mu_c * world_.coulomb_scale : 0.0;
   robot->yaw_positive = world_.yaw_friction_scale.x();
   robot->yaw_negative = world_.yaw_friction_scale.y();
   robot->ratio = robot_.r / robot_.r_w;
@@ -351,7 +315,7 @@ bool MbbrWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexc
 
 void MbbrWorld::end_rolling(const Rolling& robot) noexcept {
   s_ = Eigen::Map<const State>(robot.state);
-  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += world_.common.step_s;
+  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += common_.step_s;
   rolled_ = world_.process_noise_sigma.isZero(0.0);
   rolled_force_B_ = Eigen::Map<const Vec3>(robot.specific_force_B);
   end_tick();

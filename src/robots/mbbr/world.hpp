@@ -4,7 +4,8 @@
 // most mu_c. Simulation only; allocates nothing after construction; same seed, same bytes.
 #pragma once
 
-#include "equipoise/plant/sensors.hpp"
+#include "equipoise/plant/engine.hpp"
+#include "equipoise/plant/ticked_world.hpp"
 #include "robots/mbbr/drive.hpp"
 #include "robots/mbbr/rolling.hpp"
 #include "robots/mbbr/slipping.hpp"
@@ -31,33 +32,23 @@ MbbrParameters without_loose_wheels(MbbrParameters built, const MbbrDriveParams&
 /// Largest friction torque about each body axis at these relative rates.
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept;
 
-class MbbrWorld {
+class MbbrWorld : public TickedWorld<Mbbr::kWheels> {
  public:
   using Rolling = MbbrRollingOf<double>;
 
   MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor, const Calibration& calibration,
             const MbbrWorldParams& world);
 
-  /// Advances one tick with the bridges as commanded.
-  void advance(const MotorCommand& command);
-
   /// The same tick in two halves, where nothing is on that MbbrRollingOf leaves out: what the steps depend
   /// on, if so; and their end. Between them roll() or roll_together().
   bool begin_rolling(const MotorCommand& command, Rolling* robot) noexcept;
   void end_rolling(const Rolling& robot) noexcept;
-  BridgeType bridge() const noexcept { return motors_.type(); }
-  int steps_per_tick() const noexcept;
-  double step_s() const noexcept { return world_.common.step_s; }
 
-  /// What the devices report now.
-  RawSample sense();
+  RawSample sense() override;
   void without_attitude() noexcept { sensors_.without_attitude(); }
 
   MbbrEstimate truth() const noexcept;
   const MbbrParameters& robot() const noexcept { return robot_; }  // as built
-  double time_s() const noexcept { return time_s_; }
-  bool held() const noexcept { return held_; }
-  double battery_V() const noexcept { return motors_.battery_V(); }
   bool slipping() const noexcept { return slipping_; }  // the ball on the floor, or a wheel on the ball
   Vec3 wheel_slip_rad_s() const noexcept;               // wheels ahead of the ball
 
@@ -91,17 +82,16 @@ class MbbrWorld {
   MbbrSlipAccelerations slip_accelerations(const Here& here, const Vec2& push_W) const noexcept;
   Vec2 pull_star(const Instant& now) const noexcept;
   MbbrFloorForce needed(const Instant& now, const MbbrAccelerations& a) const noexcept;
-  void advance_tick(const MotorCommand& command);
-  Vec2 push_now() const noexcept { return push_force_W(world_.common, time_s_); }
+  Vec2 push_now() const noexcept { return push_force_W(common_, time_s_); }
   Felt felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
   Felt felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept;
   Felt felt_now() const noexcept;
-  void step(double h) noexcept;
+  void step(double h) noexcept override;
   bool roll(const Vec2& push_W, double h) noexcept;
   void slip(const Vec2& push_W, double h) noexcept;
   void load_wheels(const Instant& now, const MbbrAccelerations& a, const Vec3& contact_torques) noexcept;
   void disturb();
-  void end_tick() noexcept;
+  void end_tick() noexcept override;
   void arrive(const State& s) noexcept;
 
   MbbrParameters robot_;
@@ -109,25 +99,53 @@ class MbbrWorld {
   MbbrKinematics kinematics_;
   MbbrDynamics dynamics_;
   Vec3 mobility_;
-  MbbrDrive::Motors motors_;
   MbbrDrive drive_;
   MbbrSlipping floor_;
   MbbrSlipping loose_;  // without wheels that may slip: bodies of their own
   Ground ground_;
-  NoiseStream start_noise_, process_noise_, loop_noise_;
   State s_;
   Here here_;  // at s_
   SimulatedSensors sensors_;
   bool uneven_;
   bool limited_;  // a contact may give way
   bool plain_;    // as MbbrRollingOf has it
-  double time_s_ = 0.0;
-  bool held_ = true;
   bool slipping_ = false;
   bool rolled_ = false;  // the last tick, and what is felt since is known
   Vec3 rolled_force_B_ = Vec3::Zero();
   MbbrFriction friction_;            // of the last step
   Vec3 rotor_rad_s_ = Vec3::Zero();  // while anything slips
+};
+
+/// In another engine: our motors, gears, rollers, friction and sensors, its rigid bodies and contacts. The
+/// engine's joint is the ball against the body, body axes.
+class MbbrEngineWorld {
+ public:
+  MbbrEngineWorld(const MbbrParameters& robot, const MotorParameters& motor, const Calibration& calibration,
+                  const MbbrWorldParams& world, Engine& engine);
+
+  void advance(const MotorCommand& command);
+  RawSample sense() { return body_.sense(encoders(), motors_.battery_V()); }
+  void without_attitude() noexcept { body_.without_attitude(); }
+  MbbrEstimate truth() const noexcept;
+  double time_s() const noexcept { return body_.time_s(); }
+
+ private:
+  void step();
+  Vec3 body_force_B() const noexcept;
+  Vec3 torque_B(const Vec3& relative_rate_B, const Vec3& others, double h) noexcept;
+  Vec<kMaxMotors> encoders() const noexcept;
+
+  MbbrParameters robot_;
+  MbbrWorldParams world_;
+  MbbrKinematics kinematics_;
+  Vec3 mobility_;
+  MbbrDrive::Motors motors_;
+  MbbrDrive drive_;
+  EngineBody body_;
+  Vec3 seen_B_rad_ = Vec3::Zero();       // ball against body, as the wheels' nominal axes report it
+  Vec3 omega_dot_B_ = Vec3::Zero();      // over the last step
+  Vec3 rotor_rad_s_ = Vec3::Zero();      // where wheels may slip
+  Vec3 others_B_rad_s2_ = Vec3::Zero();  // acceleration of the joint by all but our torque, a step ago
 };
 
 }  // namespace equipoise

@@ -1,4 +1,4 @@
-#include "robots/mip/engine_world.hpp"
+#include "robots/mip/world.hpp"
 
 namespace equipoise {
 

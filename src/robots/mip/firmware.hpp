@@ -7,7 +7,6 @@
 
 #include "robots/common/firmware.hpp"
 #include "robots/mip/config.hpp"
-#include "robots/mip/engine_world.hpp"
 #include "robots/mip/world.hpp"
 
 namespace equipoise {

@@ -60,16 +60,13 @@ Mat<2, 2> wheel_mobility(const MipParameters& robot) noexcept {
 
 MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
                    const MipWorldParams& world)
-    : robot_(as_built(robot, world.common.actual)),
+    : TickedWorld(motor, calibration, world.common),
+      robot_(as_built(robot, world.common.actual)),
       world_(world),
       kinematics_(robot_),
       dynamics_(robot_),
-      motors_(motor, calibration, world.common),
       ground_{Ground(world.common.floor, robot_.r, world.common.seed),
               Ground(world.common.floor, robot_.r, world.common.seed)},
-      start_noise_(world.common.seed, kStartNoise),
-      process_noise_(world.common.seed, kProcessNoise),
-      loop_noise_(world.common.seed, kLoop),
       now_(start(robot_, world, start_noise_)),
       sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s()(kTheta), 0.0, s()(kPsi))),
       uneven_(world.common.floor.uneven()),
@@ -83,9 +80,9 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
     return {0.0, kinematics_.phi(wheel), 0.0};
   }
   Vec3 a = MipLevelOf<double>{dynamics_}.accelerations(s, facing, wheel_torque);
-  const Vec2 push_W = push_force_W(world_.common, time_s_);
-  const Vec2& slope = world_.common.floor_slope_rad;
-  const double resistance = world_.common.rolling_resistance;
+  const Vec2 push_W = push_force_W(common_, time_s_);
+  const Vec2& slope = common_.floor_slope_rad;
+  const double resistance = common_.rolling_resistance;
   if (!push_W.isZero(0.0) || !slope.isZero(0.0) || resistance != 0.0 || uneven_) {
     // Force along the rolling direction at the centre of mass: power F (r (phi' + theta') + l cos theta'),
     // with the axle's speed along -y. On a slope the whole weight pulls the axle downhill.
@@ -113,8 +110,8 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
 }
 
 Vec2 MipWorld::friction_limit(const Vec2& wheel_rates) const noexcept {
-  const Stiction& stiction = world_.common.stiction;
-  const double scale = world_.common.friction_now(time_s_);
+  const Stiction& stiction = common_.stiction;
+  const double scale = common_.friction_now(time_s_);
   return {scale * now_.coulomb_N_m[0] * stiction.factor(wheel_rates.x()),
           scale * now_.coulomb_N_m[1] * stiction.factor(wheel_rates.y())};
 }
@@ -167,7 +164,7 @@ void MipWorld::step(double h) noexcept {
   }
   if (uneven_) feel_ground(h);
   equipoise::step(
-      &now_, Body{*this}, Facing(s()), world_.common.step_s, h,
+      &now_, Body{*this}, Facing(s()), common_.step_s, h,
       [this](const Vec2& rates) { return motors_.torque(rates); },
       [this](const Vec2& rates) { return friction_limit(rates); },
       [this](const Vec3& accelerations) {
@@ -176,39 +173,9 @@ void MipWorld::step(double h) noexcept {
   time_s_ += h;
 }
 
-void MipWorld::advance(const MotorCommand& command) {
-  advance_tick(command);
-  const double missed = world_.common.missed_tick_share;
-  if (missed > 0.0 && loop_noise_.uniform(0.0, 1.0) < missed) advance_tick(command);
-}
-
-void MipWorld::advance_tick(const MotorCommand& command) {
-  if (command.enable) held_ = false;
-  const double h = world_.common.step_s;
-  const int steps = steps_per_tick();
-  const double taken_at = world_.common.actuation_steps();
-  for (int i = 0; i < steps && !held_; ++i) {
-    const double part = taken_at - i;
-    if (part > 0.0 && part < 1.0) {  // the PWM takes the duty within this step
-      step(part * h);
-      motors_.command(command);
-      step((1.0 - part) * h);
-    } else {
-      if (part == 0.0) motors_.command(command);
-      step(h);
-    }
-  }
-  if (held_) time_s_ += kTickS;
-  end_tick();
-}
-
 void MipWorld::end_tick() noexcept {
   if (!held_) disturb();
   motors_.update_battery(now_.wheel_rates(s()));
-}
-
-int MipWorld::steps_per_tick() const noexcept {
-  return static_cast<int>(std::lround(kTickS / world_.common.step_s));
 }
 
 bool MipWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexcept {
@@ -222,7 +189,7 @@ bool MipWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexce
 
 void MipWorld::end_rolling(const Rolling& robot) noexcept {
   now_ = robot;
-  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += world_.common.step_s;
+  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += common_.step_s;
   end_tick();
 }
 
@@ -231,8 +198,8 @@ RawSample MipWorld::sense() {
   const Vec2 rates = now_.wheel_rates(at);
   const Vec2 gear = now_.gear_torque(rates, motors_.torque(rates));
   const Facing facing(at);
-  const Vec2 friction = friction_torque<double>(now_, Body{*this}, at, facing, gear, friction_limit(rates),
-                                                world_.common.step_s);
+  const Vec2 friction =
+      friction_torque<double>(now_, Body{*this}, at, facing, gear, friction_limit(rates), common_.step_s);
   const Felt here = felt(accelerations(at, facing, gear + friction));
   TrueMotion m;
   m.time_s = time_s_;

@@ -7,7 +7,8 @@
 
 #include <array>
 
-#include "equipoise/plant/sensors.hpp"
+#include "equipoise/plant/engine.hpp"
+#include "equipoise/plant/ticked_world.hpp"
 #include "robots/mip/rolling.hpp"
 
 namespace equipoise {
@@ -32,33 +33,23 @@ MipParameters as_built(MipParameters nominal, const ActualScales& actual) noexce
 /// Of the wheels' encoder rates per torque at the wheels, upright at rest.
 Mat<2, 2> wheel_mobility(const MipParameters& robot) noexcept;
 
-class MipWorld {
+class MipWorld : public TickedWorld<Mip::kWheels> {
  public:
   using Rolling = MipRollingOf<double>;
 
   MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
            const MipWorldParams& world);
 
-  /// Advances one tick with the bridges as commanded.
-  void advance(const MotorCommand& command);
-
   /// The same tick in two halves, where nothing is on that MipRollingOf leaves out: what the steps depend on,
   /// if so; and their end. Between them roll() or roll_together().
   bool begin_rolling(const MotorCommand& command, Rolling* robot) noexcept;
   void end_rolling(const Rolling& robot) noexcept;
-  BridgeType bridge() const noexcept { return motors_.type(); }
-  int steps_per_tick() const noexcept;
-  double step_s() const noexcept { return world_.common.step_s; }
 
-  /// What the devices report now.
-  RawSample sense();
+  RawSample sense() override;
   void without_attitude() noexcept { sensors_.without_attitude(); }
 
   MipEstimate truth() const noexcept;
   const MipParameters& robot() const noexcept { return robot_; }  // as built
-  double time_s() const noexcept { return time_s_; }
-  bool held() const noexcept { return held_; }
-  double battery_V() const noexcept { return motors_.battery_V(); }
 
  private:
   using State = MipStateOf<double>;
@@ -80,26 +71,50 @@ class MipWorld {
   void feel_ground(double h) noexcept;
   double weight_kg() const noexcept { return robot_.m_b + 2.0 * robot_.m_w; }
   Felt felt(const Vec3& accelerations) const noexcept;
-  void step(double h) noexcept;
-  void advance_tick(const MotorCommand& command);
+  void step(double h) noexcept override;
   void disturb();
-  void end_tick() noexcept;
+  void end_tick() noexcept override;
   bool lifted() const noexcept { return world_.lift_at_s >= 0.0 && time_s_ >= world_.lift_at_s; }
 
   MipParameters robot_;
   MipWorldParams world_;
   MipKinematics kinematics_;
   MipDynamics dynamics_;
-  SimulatedMotors<Mip::kWheels> motors_;
   std::array<Ground, Mip::kWheels> ground_;  // at +x and at -x of the axle
   Vec2 ground_N_ = Vec2::Zero();  // forward force of both over this step, and of the first less the other
-  NoiseStream start_noise_, process_noise_, loop_noise_;
   MipRollingOf<double> now_;
   SimulatedSensors sensors_;
   bool uneven_;
   bool plain_;  // as MipRollingOf has it
-  double time_s_ = 0.0;
-  bool held_ = true;
+};
+
+/// In another engine: our motors, gears, friction and sensors, its rigid bodies and tyres. The engine's
+/// joints are the wheels against the body, in the order of the equations.
+class MipEngineWorld {
+ public:
+  MipEngineWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
+                 const MipWorldParams& world, Engine& engine);
+
+  void advance(const MotorCommand& command);
+  RawSample sense() { return body_.sense(encoders(), motors_.battery_V()); }
+  void without_attitude() noexcept { body_.without_attitude(); }
+  MipEstimate truth() const noexcept;
+  double time_s() const noexcept { return body_.time_s(); }
+
+ private:
+  void step();
+  Vec2 wheel_rates() const noexcept { return body_.motion().joint_rate_rad_s.head<2>(); }
+  Vec<kMaxMotors> encoders() const noexcept;
+
+  MipParameters robot_;
+  MipWorldParams world_;
+  MipKinematics kinematics_;
+  Mat<2, 2> mobility_;
+  SimulatedMotors<Mip::kWheels> motors_;
+  std::array<GearPlay, Mip::kWheels> gears_;
+  EngineBody body_;
+  Vec2 wheel_angle_rad_ = Vec2::Zero();
+  Vec2 others_rad_s2_ = Vec2::Zero();  // acceleration of the wheels by all but our torque, a step ago
 };
 
 }  // namespace equipoise
