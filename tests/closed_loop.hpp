@@ -97,7 +97,7 @@ class ClosedLoopWith {
   Pipeline pipeline;
 
  private:
-  app::PlantBackend<World> backend_;
+  app::PlantBackend backend_;
   app::Hardware hardware_;
   const std::atomic<bool> never_{false};
 };

@@ -9,12 +9,12 @@
 #include "app/cli/interrupt.hpp"
 #include "app/commission/board_edit.hpp"
 #include "app/commission/simulated_stand.hpp"
-#include "app/io/mock.hpp"
 #include "app/text/files.hpp"
 #include "equipoise/config.hpp"
 #include "robots/mbbr/config.hpp"
 #include "robots/mip/config.hpp"
 #include "support/assign.hpp"
+#include "support/mock.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -72,7 +72,7 @@ void SimulatedStand::build() {
   stand.accel_scale_error = {0.01, -0.015, 0.02};  // data sheet: 3 %
   stand.wiring = faults_.wiring;
   world_ = std::make_unique<StandWorld>(stand, setup_.motor, setup_.calibration, setup_.world);
-  backend_ = std::make_unique<PlantBackend<StandWorld>>(*world_);
+  backend_ = std::make_unique<PlantBackend>(*world_);
   if (faults_.moving) world_->shake_by_hand({0.0, 0.0, 30.0 * kPi / 180.0});
 }
 

@@ -46,7 +46,7 @@ class SimulatedStand {
   StandSetup setup_;
   StandFaults faults_;
   std::unique_ptr<StandWorld> world_;
-  std::unique_ptr<PlantBackend<StandWorld>> backend_;
+  std::unique_ptr<PlantBackend> backend_;
 };
 
 }  // namespace equipoise::app

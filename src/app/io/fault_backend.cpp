@@ -20,29 +20,27 @@ int FaultBackend::stall(int ticks, std::int64_t* now_ns) {
   return 0;
 }
 
-int FaultBackend::wait_tick(void* p, std::int64_t* now_ns) {
-  FaultBackend& b = self(p);
-  int status = rio_wait_tick(&b.inner_, now_ns);
-  if (b.left_ > 0 && b.age_ > 0) --b.left_;
-  ++b.age_;
-  b.log_failed_ = b.is(FaultKind::kLogFull);
-  if (status == 0 && b.first(FaultKind::kStall20ms)) status = b.stall(4, now_ns);
-  if (status == 0 && b.first(FaultKind::kStall50ms)) status = b.stall(10, now_ns);
-  if (status == 0 && b.first(FaultKind::kStall1ms)) *now_ns += 1'000'000;
-  if (status == 0 && b.first(FaultKind::kBusHang)) status = b.stall(12, now_ns);
+int FaultBackend::wait_tick(std::int64_t* now_ns) {
+  int status = rio_wait_tick(&inner_, now_ns);
+  if (left_ > 0 && age_ > 0) --left_;
+  ++age_;
+  log_failed_ = is(FaultKind::kLogFull);
+  if (status == 0 && first(FaultKind::kStall20ms)) status = stall(4, now_ns);
+  if (status == 0 && first(FaultKind::kStall50ms)) status = stall(10, now_ns);
+  if (status == 0 && first(FaultKind::kStall1ms)) *now_ns += 1'000'000;
+  if (status == 0 && first(FaultKind::kBusHang)) status = stall(12, now_ns);
   return status;
 }
 
-int FaultBackend::write_motors(void* p, const rio_motors_t* motors) {
-  FaultBackend& b = self(p);
-  if (b.cut_) return 0;  // the guard holds them
+int FaultBackend::write_motors(const rio_motors_t& motors) {
+  if (cut_) return 0;  // the guard holds them
   // A bridge that does not obey keeps its last duty until the guard or the next try stops it.
-  if (b.is(FaultKind::kWriteError)) return -EIO;
-  rio_motors_t done = *motors;
-  if (b.is(FaultKind::kMotorDead)) done.duty[0] = 0.0;
-  if (b.is(FaultKind::kMotorsSwapped)) std::swap(done.duty[0], done.duty[1]);
-  if (b.is(FaultKind::kMotorStuck)) done.duty[0] = 0.6;
-  return rio_write_motors(&b.inner_, &done);
+  if (is(FaultKind::kWriteError)) return -EIO;
+  rio_motors_t done = motors;
+  if (is(FaultKind::kMotorDead)) done.duty[0] = 0.0;
+  if (is(FaultKind::kMotorsSwapped)) std::swap(done.duty[0], done.duty[1]);
+  if (is(FaultKind::kMotorStuck)) done.duty[0] = 0.6;
+  return rio_write_motors(&inner_, &done);
 }
 
 void FaultBackend::spoil_gyro(rio_sensors_t* s) const {
@@ -181,19 +179,18 @@ void FaultBackend::spoil(rio_sensors_t* s) {
   }
 }
 
-int FaultBackend::read_sensors(void* p, rio_sensors_t* out) {
-  FaultBackend& b = self(p);
-  const int status = rio_read_sensors(&b.inner_, out);
+int FaultBackend::read_sensors(rio_sensors_t* out) {
+  const int status = rio_read_sensors(&inner_, out);
   if (status != 0) return status;
-  if (b.first(FaultKind::kClockJump)) b.clock_offset_ns_ += kClockJump_ns;
-  out->t_ns += b.clock_offset_ns_;
-  for (std::size_t i = b.history_.size() - 1; i > 0; --i) b.history_[i] = b.history_[i - 1];
-  b.history_[0] = *out;
-  if (b.left_ <= 0) {
-    b.frozen_ = *out;
-    std::copy(std::begin(out->encoder_counts), std::end(out->encoder_counts), b.encoder_at_start_.begin());
+  if (first(FaultKind::kClockJump)) clock_offset_ns_ += kClockJump_ns;
+  out->t_ns += clock_offset_ns_;
+  for (std::size_t i = history_.size() - 1; i > 0; --i) history_[i] = history_[i - 1];
+  history_[0] = *out;
+  if (left_ <= 0) {
+    frozen_ = *out;
+    std::copy(std::begin(out->encoder_counts), std::end(out->encoder_counts), encoder_at_start_.begin());
   } else {
-    b.spoil(out);
+    spoil(out);
   }
   return 0;
 }

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <random>
 
-#include "robot_io.h"
+#include "app/io/hardware.hpp"
 
 namespace equipoise::app {
 
@@ -131,7 +131,7 @@ inline constexpr std::array<FaultInfo, static_cast<std::size_t>(FaultKind::kCoun
     {"log_full", 2, "the log cannot be written"},
 }};
 
-class FaultBackend {
+class FaultBackend : public Backend {
  public:
   FaultBackend(rio_t inner, std::uint64_t seed) : inner_(inner), engine_(seed) {}
 
@@ -146,15 +146,9 @@ class FaultBackend {
   const std::atomic<bool>& log_failed() const { return log_failed_; }
   bool remote_silent() const { return is(FaultKind::kRemoteLost); }
 
-  rio_t io() {
-    static const rio_ops_t ops{wait_tick, read_sensors, write_motors, motors_off, close};
-    return {&ops, this};
-  }
-
  private:
   static constexpr int kGuardTicks = 3;
   static constexpr std::int64_t kClockJump_ns = 1'000'000'000;
-  static FaultBackend& self(void* p) { return *static_cast<FaultBackend*>(p); }
 
   bool is(FaultKind kind) const { return left_ > 0 && kind_ == kind; }
   bool first(FaultKind kind) const { return is(kind) && age_ == 1; }
@@ -163,14 +157,14 @@ class FaultBackend {
   void spoil_imu(rio_sensors_t* s);
   void spoil_gyro(rio_sensors_t* s) const;
 
-  static int wait_tick(void* p, std::int64_t* now_ns);
-  static int read_sensors(void* p, rio_sensors_t* out);
-  static int write_motors(void* p, const rio_motors_t* motors);
-  static int motors_off(void* p) {
-    self(p).cut_ = false;  // the loop has let go
-    return rio_motors_off(&self(p).inner_);
+  int wait_tick(std::int64_t* now_ns) override;
+  int read_sensors(rio_sensors_t* out) override;
+  int write_motors(const rio_motors_t& motors) override;
+  int motors_off() override {
+    cut_ = false;  // the loop has let go
+    return rio_motors_off(&inner_);
   }
-  static void close(void* p) { rio_close(&self(p).inner_); }
+  void close() override { rio_close(&inner_); }
 
   rio_t inner_;
   std::atomic<bool> log_failed_{false};

@@ -1,10 +1,37 @@
-// The C hardware boundary as the loop's Io. RT-safe as far as the backend is.
+// The C hardware boundary from both sides: the loop's Io, and a backend that is a class. RT-safe as far as
+// the backend is.
 #pragma once
 
 #include "equipoise/samples.hpp"
 #include "robot_io.h"
 
 namespace equipoise::app {
+
+/// What stands behind a rio_t, function by function (robot_io.h).
+class Backend {
+ public:
+  Backend() = default;
+  Backend(const Backend&) = delete;
+  Backend& operator=(const Backend&) = delete;
+  virtual ~Backend() = default;
+
+  rio_t io() noexcept {
+    static const rio_ops_t ops{[](void* p, std::int64_t* now_ns) { return self(p).wait_tick(now_ns); },
+                               [](void* p, rio_sensors_t* out) { return self(p).read_sensors(out); },
+                               [](void* p, const rio_motors_t* m) { return self(p).write_motors(*m); },
+                               [](void* p) { return self(p).motors_off(); },
+                               [](void* p) { self(p).close(); }};
+    return {&ops, this};
+  }
+
+ private:
+  static Backend& self(void* p) noexcept { return *static_cast<Backend*>(p); }
+  virtual int wait_tick(std::int64_t* now_ns) = 0;
+  virtual int read_sensors(rio_sensors_t* out) = 0;
+  virtual int write_motors(const rio_motors_t& motors) = 0;
+  virtual int motors_off() = 0;
+  virtual void close() = 0;
+};
 
 /// Owns a backend for the loop. `close` is motors off, then release.
 class Hardware {

@@ -98,11 +98,6 @@ Lockstep::~Lockstep() {
   if (fd_ >= 0) ::close(fd_);
 }
 
-rio_t Lockstep::io() noexcept {
-  static const rio_ops_t ops{wait_tick, read_sensors, write_motors, motors_off, close};
-  return {&ops, this};
-}
-
 int Lockstep::stop(LockstepEnd end, int code, const std::string& why) {
   if (end_ == LockstepEnd::kRunning) {
     end_ = end;
@@ -164,40 +159,31 @@ int Lockstep::answer(const rio_motors_t& motors, bool last) {
   return 0;
 }
 
-int Lockstep::wait_tick(void* self, std::int64_t* now_ns) {
-  auto& me = *static_cast<Lockstep*>(self);
-  if (me.end_ != LockstepEnd::kRunning) return -ESHUTDOWN;
-  if (me.sensors_.last != 0) return me.stop(LockstepEnd::kFinished, -ESHUTDOWN, "");
-  const int status = me.receive();
+int Lockstep::wait_tick(std::int64_t* now_ns) {
+  if (end_ != LockstepEnd::kRunning) return -ESHUTDOWN;
+  if (sensors_.last != 0) return stop(LockstepEnd::kFinished, -ESHUTDOWN, "");
+  const int status = receive();
   if (status != 0) return status;
-  *now_ns = me.sensors_.step * static_cast<std::int64_t>(kTickS * 1e9);
+  *now_ns = sensors_.step * static_cast<std::int64_t>(kTickS * 1e9);
   return 0;
 }
 
-int Lockstep::read_sensors(void* self, rio_sensors_t* out) {
-  auto& me = *static_cast<Lockstep*>(self);
-  *out = counts_of(me.sensors_, me.calibration_);
+int Lockstep::read_sensors(rio_sensors_t* out) {
+  *out = counts_of(sensors_, calibration_);
   return 0;
 }
-
-int Lockstep::write_motors(void* self, const rio_motors_t* motors) {
-  return static_cast<Lockstep*>(self)->answer(*motors, false);
-}
-
-int Lockstep::motors_off(void* self) { return static_cast<Lockstep*>(self)->answer(rio_motors_t{}, false); }
 
 /// An engine that is still there gets `last` as the answer to the step it is in.
-void Lockstep::close(void* self) {
-  auto& me = *static_cast<Lockstep*>(self);
-  if (me.fd_ < 0) return;
-  if (me.end_ == LockstepEnd::kRunning && me.sensors_.last == 0 && !me.owes_answer_) {
-    me.timeout_ms_ = std::min(me.timeout_ms_, kFarewell_ms);
-    if (me.receive() != 0) me.end_ = LockstepEnd::kRunning;  // already stopping for another reason
+void Lockstep::close() {
+  if (fd_ < 0) return;
+  if (end_ == LockstepEnd::kRunning && sensors_.last == 0 && !owes_answer_) {
+    timeout_ms_ = std::min(timeout_ms_, kFarewell_ms);
+    if (receive() != 0) end_ = LockstepEnd::kRunning;  // already stopping for another reason
   }
-  me.owes_answer_ = true;
-  (void)me.answer(rio_motors_t{}, true);
-  ::close(me.fd_);
-  me.fd_ = -1;
+  owes_answer_ = true;
+  (void)answer(rio_motors_t{}, true);
+  ::close(fd_);
+  fd_ = -1;
 }
 
 rio_sensors_t counts_of(const lockstep_sensors_t& s, const Calibration& c) noexcept {

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <string>
 
+#include "app/io/hardware.hpp"
 #include "equipoise/lockstep_sensors_t.hpp"
 #include "equipoise/sense/calibrate.hpp"
-#include "robot_io.h"
 
 namespace equipoise::app {
 
@@ -33,24 +33,21 @@ class LockstepServer {
 
 enum class LockstepEnd { kRunning, kFinished, kPeerGone, kTimeout, kProtocol };
 
-class Lockstep {
+class Lockstep : public Backend {
  public:
   /// Owns the connection `fd`.
   Lockstep(int fd, const Calibration& calibration, double timeout_s);
-  ~Lockstep();
-  Lockstep(const Lockstep&) = delete;
-  Lockstep& operator=(const Lockstep&) = delete;
+  ~Lockstep() override;
 
-  rio_t io() noexcept;
   LockstepEnd end() const noexcept { return end_; }
   const std::string& error() const noexcept { return error_; }
 
  private:
-  static int wait_tick(void* self, std::int64_t* now_ns);
-  static int read_sensors(void* self, rio_sensors_t* out);
-  static int write_motors(void* self, const rio_motors_t* motors);
-  static int motors_off(void* self);
-  static void close(void* self);
+  int wait_tick(std::int64_t* now_ns) override;
+  int read_sensors(rio_sensors_t* out) override;
+  int write_motors(const rio_motors_t& motors) override { return answer(motors, false); }
+  int motors_off() override { return answer({}, false); }
+  void close() override;
 
   int receive();
   int answer(const rio_motors_t& motors, bool last);

@@ -23,7 +23,7 @@ struct PlannedFault {
 /// "NAME@T" until the end, or "NAME@T+D" for D seconds; InputError says what is wrong.
 PlannedFault planned_fault(const std::string& text);
 
-class PracticeBackend {
+class PracticeBackend : public Backend {
  public:
   /// `speed`: simulated seconds in one of the wall clock.
   PracticeBackend(rio_t simulated, double speed, std::vector<PlannedFault> faults, std::uint64_t seed)
@@ -32,10 +32,6 @@ class PracticeBackend {
               [](const PlannedFault& a, const PlannedFault& b) { return a.at_s < b.at_s; });
   }
 
-  rio_t io() noexcept {
-    static const rio_ops_t ops{wait_tick, read_sensors, write_motors, motors_off, close};
-    return {&ops, this};
-  }
   /// A log that cannot be written is a fault outside the boundary.
   bool breaks_log() const noexcept {
     return std::any_of(faults_.begin(), faults_.end(),
@@ -44,22 +40,17 @@ class PracticeBackend {
   const std::atomic<bool>& log_failed() const noexcept { return broken_.log_failed(); }
 
  private:
-  static PracticeBackend& self(void* p) noexcept { return *static_cast<PracticeBackend*>(p); }
-
-  static int wait_tick(void* p, std::int64_t* now_ns) {
-    PracticeBackend& b = self(p);
-    for (; b.next_ < b.faults_.size() && b.faults_[b.next_].at_s <= b.time_s_; ++b.next_)
-      b.broken_.start(b.faults_[b.next_].kind, b.faults_[b.next_].ticks);
-    const int status = rio_wait_tick(&b.inner_, now_ns);
-    if (status == 0) b.keep_pace(*now_ns);
+  int wait_tick(std::int64_t* now_ns) override {
+    for (; next_ < faults_.size() && faults_[next_].at_s <= time_s_; ++next_)
+      broken_.start(faults_[next_].kind, faults_[next_].ticks);
+    const int status = rio_wait_tick(&inner_, now_ns);
+    if (status == 0) keep_pace(*now_ns);
     return status;
   }
-  static int read_sensors(void* p, rio_sensors_t* out) { return rio_read_sensors(&self(p).inner_, out); }
-  static int write_motors(void* p, const rio_motors_t* motors) {
-    return rio_write_motors(&self(p).inner_, motors);
-  }
-  static int motors_off(void* p) { return rio_motors_off(&self(p).inner_); }
-  static void close(void* p) { rio_close(&self(p).inner_); }
+  int read_sensors(rio_sensors_t* out) override { return rio_read_sensors(&inner_, out); }
+  int write_motors(const rio_motors_t& motors) override { return rio_write_motors(&inner_, &motors); }
+  int motors_off() override { return rio_motors_off(&inner_); }
+  void close() override { rio_close(&inner_); }
 
   void keep_pace(std::int64_t simulated_ns) {
     constexpr std::int64_t kLost_ns = 200'000'000;  // a laptop that slept does not catch up

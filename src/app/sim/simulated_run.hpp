@@ -43,7 +43,7 @@ class SimulatedRun {
   SimOptions options_;
   const TickObserver& observe_;
   const std::atomic<bool>& stop_;
-  PlantBackend<World> backend_;
+  PlantBackend backend_;
   Hardware hardware_;
   RunMeter meter_;
   VerdictJudge judge_;
