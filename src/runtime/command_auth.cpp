@@ -7,6 +7,8 @@
 #include <cstring>
 #include <vector>
 
+#include "equipoise/runtime/command_wire.hpp"
+
 namespace equipoise::runtime {
 namespace {
 
@@ -14,15 +16,12 @@ static_assert(sizeof(signed_command_t::mac) == CommandKey::kMacBytes);
 static_assert(sizeof(command_session_t::mac) == CommandKey::kMacBytes);
 static_assert(sizeof(signed_command_t::holder) == CommandKeys::kLongestName);
 
-/// What is proved: a name, NUL, and the message without its proof.
-template <class Message>
-std::vector<std::uint8_t> proved(const std::string& name, Message message) {
-  std::memset(message.mac, 0, sizeof message.mac);
+/// What is proved: a name, NUL, and the message with zeros for its proof, which is its end.
+std::vector<std::uint8_t> proved(const std::string& name, const std::vector<std::uint8_t>& message) {
   std::vector<std::uint8_t> bytes(name.begin(), name.end());
   bytes.push_back(0);
-  const std::size_t begin = bytes.size();
-  bytes.resize(begin + static_cast<std::size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), static_cast<int>(begin), static_cast<int>(bytes.size() - begin));
+  bytes.insert(bytes.end(), message.begin(), message.end() - CommandKey::kMacBytes);
+  bytes.resize(bytes.size() + CommandKey::kMacBytes);
   return bytes;
 }
 
@@ -45,20 +44,20 @@ void set_name(const std::string& name, std::uint8_t (*bytes)[CommandKeys::kLonge
 }
 
 void sign(const CommandKeys& keys, const std::string& robot, signed_command_t* message) {
-  keys.commands(name_in(message->holder)).mac(proved(robot, *message), message->mac);
+  keys.commands(name_in(message->holder)).mac(proved(robot, encoded(*message)), message->mac);
 }
 
 bool authentic(const CommandKeys& keys, const std::string& robot, const signed_command_t& message) {
   const std::string holder = name_in(message.holder);
-  return !holder.empty() && keys.commands(holder).proves(proved(robot, message), message.mac);
+  return !holder.empty() && keys.commands(holder).proves(proved(robot, encoded(message)), message.mac);
 }
 
 void sign(const CommandKeys& keys, command_session_t* announcement) {
-  keys.announcements().mac(proved("", *announcement), announcement->mac);
+  keys.announcements().mac(proved("", encoded(*announcement)), announcement->mac);
 }
 
 bool authentic(const CommandKeys& keys, const command_session_t& announcement) {
-  return keys.announcements().proves(proved("", announcement), announcement.mac);
+  return keys.announcements().proves(proved("", encoded(announcement)), announcement.mac);
 }
 
 CommandGate::CommandGate(const CommandKeys& keys, std::int64_t timeout_ms, const std::string& robot)

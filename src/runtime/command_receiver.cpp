@@ -53,7 +53,7 @@ void CommandReceiver::announce(std::int64_t to) {
   const std::int64_t followed = followed_.load(std::memory_order_acquire);
   const bool up_to_date = followed / 4 == gate_.wish().turn;
   const auto state = up_to_date ? static_cast<std::int8_t>(followed % 4) : command_session_t::WAITING;
-  say(*wire_, gate_.announcement(static_cast<std::int64_t>(now_ms()), state, to));
+  wire_->say(encoded(gate_.announcement(static_cast<std::int64_t>(now_ms()), state, to)));
 }
 
 void CommandReceiver::note(const signed_command_t& message) const {

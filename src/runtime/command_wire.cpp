@@ -37,8 +37,8 @@ class LcmWire final : public CommandWire {
     received_ = nullptr;
   }
 
-  void say(const std::uint8_t* message, std::size_t size) override {
-    lcm_.publish(said_, message, static_cast<unsigned>(size));
+  void say(const std::vector<std::uint8_t>& message) override {
+    lcm_.publish(said_, message.data(), static_cast<unsigned>(message.size()));
   }
 
  private:
@@ -68,8 +68,8 @@ void StreamWire::listen(int milliseconds, const Received& received) {
   } while (!any && std::chrono::steady_clock::now() < end);
 }
 
-void StreamWire::say(const std::uint8_t* message, std::size_t size) {
-  const std::vector<std::uint8_t> frame = to_frame(message, size);
+void StreamWire::say(const std::vector<std::uint8_t>& message) {
+  const std::vector<std::uint8_t> frame = to_frame(message.data(), message.size());
   constexpr int kPatience_ms = 100;  // a CAN queue holds ten frames; a dead line loses the rest of ours
   std::size_t taken = 0;
   for (int waited_ms = 0; taken < frame.size() && waited_ms < kPatience_ms;) {

@@ -103,22 +103,22 @@ void LogWriter::preamble(std::int64_t utime, std::string_view channel,
   preamble_utime_ = utime;
   preamble_channel_ = channel;
   preamble_ = data;
-  std::copy(data.begin(), data.end(), event(utime, channel, data.size()));
+  event(utime, channel, data);
   write_out();
 }
 
-std::uint8_t* LogWriter::event(std::int64_t utime, std::string_view channel, std::size_t size) {
+void LogWriter::event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data) {
   const std::size_t before = used_;
-  used_ += kHeaderBytes + channel.size() + size;
+  used_ += kHeaderBytes + channel.size() + data.size();
   if (used_ > tick_.size()) tick_.resize(2 * used_);
   std::uint8_t* at = tick_.data() + before;
   at = store_big_endian(kSync, at);
   at = store_big_endian(static_cast<std::uint64_t>(event_number_++), at);
   at = store_big_endian(static_cast<std::uint64_t>(utime), at);
   at = store_big_endian(static_cast<std::uint32_t>(channel.size()), at);
-  at = store_big_endian(static_cast<std::uint32_t>(size), at);
-  std::memcpy(at, channel.data(), channel.size());
-  return at + channel.size();
+  at = store_big_endian(static_cast<std::uint32_t>(data.size()), at);
+  at = std::copy(channel.begin(), channel.end(), at);
+  std::copy(data.begin(), data.end(), at);
 }
 
 void LogWriter::end_tick() {

@@ -37,8 +37,7 @@ class LogWriter {
 
   /// Repeated at the start of every further file.
   void preamble(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data);
-  /// Where the event's `size` bytes belong; until the next call.
-  std::uint8_t* event(std::int64_t utime, std::string_view channel, std::size_t size);
+  void event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data);
   /// The tick's events go to the kernel, all or none.
   void end_tick();
   void close();

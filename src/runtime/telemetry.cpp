@@ -61,12 +61,7 @@ class Telemetry::Writer {
     publish_now_ = lcm_ != nullptr && publish_due();
     utime_ = r.now_ns / 1000;
     tick_ = r.tick;
-    fields::each_message(
-        r, [this](auto message, const char* channel, const auto& record) { emit(message, channel, record); });
-    for (std::size_t i = 0; i < channels_.size() && i < kMaxEstimators; ++i) {
-      if ((r.compared & (1U << i)) != 0) emit(fields::State{}, channels_[i].c_str(), r.others[i]);
-    }
-    if (r.has_truth) emit(fields::State{}, fields::kTruthChannel, r.truth);
+    if (log_.is_open() || publish_now_) messages(r);
     if (r.compute_ns > 0) histogram(r);  // simulated time takes no time
     log_.end_tick();
     note_failure();
@@ -75,7 +70,8 @@ class Telemetry::Writer {
 
   void end(const EndRecord& end) {
     publish_now_ = lcm_ != nullptr;
-    emit(fields::End{}, fields::kEndChannel, end);
+    encode(fields::End{}, end, utime_, tick_, &buffer_);
+    emit(fields::kEndChannel);
     log_.end_tick();
   }
 
@@ -93,23 +89,26 @@ class Telemetry::Writer {
     return true;
   }
 
-  /// Encoded where it lies in the log, and published from there.
-  template <class Message, class Record>
-  void emit(Message message, const char* channel, const Record& record) {
-    if (!log_.is_open() && !publish_now_) return;  // nobody would read it
-    const std::size_t size = encoded_size(message, record);
-    if (log_.is_open()) {
-      std::uint8_t* const data = log_.event(utime_, channel, size);
-      encode(message, record, utime_, tick_, data);
-      if (publish_now_) publish(channel, data, size);
-    } else {
+  void messages(const TickRecord& r) {
+    const auto encoded = [this](auto message, const char* channel, const auto& record) {
       encode(message, record, utime_, tick_, &buffer_);
-      publish(channel, buffer_.data(), size);
+      emit(channel);
+    };
+    fields::each_message(r, encoded);
+    for (std::size_t i = 0; i < channels_.size() && i < kMaxEstimators; ++i) {
+      if ((r.compared & (1U << i)) != 0) encoded(fields::State{}, channels_[i].c_str(), r.others[i]);
     }
+    if (r.has_truth) encoded(fields::State{}, fields::kTruthChannel, r.truth);
   }
 
-  void publish(const char* channel, const std::uint8_t* data, std::size_t size) {
-    lcm_publish(lcm_, channel, data, static_cast<unsigned>(size));
+  /// What the buffer holds.
+  void emit(const char* channel) {
+    if (log_.is_open()) log_.event(utime_, channel, buffer_);
+    if (publish_now_) publish(channel);
+  }
+
+  void publish(const char* channel) {
+    lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned>(buffer_.size()));
   }
 
   void note_failure() {
@@ -121,7 +120,7 @@ class Telemetry::Writer {
   void announce(const RunInfo& run) {
     encode(fields::Run{}, run, utime_, tick_, &buffer_);
     if (log_.is_open()) log_.preamble(utime_, fields::kRunChannel, buffer_);
-    if (lcm_ != nullptr) publish(fields::kRunChannel, buffer_.data(), buffer_.size());
+    if (lcm_ != nullptr) publish(fields::kRunChannel);
   }
 
   /// Once a second of ticks.
@@ -132,7 +131,8 @@ class Telemetry::Writer {
     fields::HistogramRecord record{{}, wake_late_.bins(), compute_.bins()};
     for (std::size_t i = 0; i < TimeHistogram::kBins; ++i) record.upper_ns[i] = TimeHistogram::upper_ns(i);
     publish_now_ = lcm_ != nullptr;
-    emit(fields::Histogram{}, fields::kHistogramChannel, record);
+    encode(fields::Histogram{}, record, utime_, tick_, &buffer_);
+    emit(fields::kHistogramChannel);
   }
 
   const TelemetryOptions& options_;

@@ -55,7 +55,7 @@ class Remote {
       command_session_t said;
       if (said.decode(data, 0, length) == length && sender_.hear(said)) heard_ = said;
     });
-    while (const auto question = sender_.ask()) runtime::say(*wire_, *question);
+    while (const auto question = sender_.ask()) say(*question);
   }
   /// Until the robot is as wanted, or five seconds.
   template <class Wanted>
@@ -71,7 +71,7 @@ class Remote {
   signed_command_t command(std::int8_t action) {
     return sender_.sign(&link(), link().turn, action, {{0.1, 0.0}, 0.0});
   }
-  void say(const signed_command_t& m) { runtime::say(*wire_, m); }
+  void say(const signed_command_t& m) { wire_->say(runtime::encoded(m)); }
 
   runtime::CommandReceiver robot_;
   std::unique_ptr<Wire> wire_;
@@ -204,8 +204,8 @@ TEST(CanRemote, TwoTalkersAtOnceAreBothHeard) {
   const auto nothing = [](const std::uint8_t*, std::size_t) {};
   int heard = 0;
   for (int i = 0; i < 20; ++i) {  // they may have to find out first that they share an identifier
-    std::thread other([&] { b.say(theirs.data(), theirs.size()); });
-    a.say(ours.data(), ours.size());
+    std::thread other([&] { b.say(theirs); });
+    a.say(ours);
     other.join();
     heard = 0;
     for (int k = 0; k < 4; ++k) robot.listen(5, [&](const std::uint8_t*, std::size_t) { ++heard; });

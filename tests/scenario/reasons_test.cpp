@@ -137,7 +137,7 @@ std::uint32_t held_fast(double creep_rad_s) {
 class DeadWire final : public runtime::CommandWire {
  public:
   void listen(int, const Received&) override { std::this_thread::sleep_for(std::chrono::milliseconds(1)); }
-  void say(const std::uint8_t*, std::size_t) override {}
+  void say(const std::vector<std::uint8_t>&) override {}
 };
 
 std::uint32_t silent_remote() {

@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
     std::string hex;
     std::getline(std::cin, hex);
     const std::vector<std::uint8_t> message = from_hex(hex);
-    wire.say(message.data(), message.size());
+    wire.say(message);
     return 0;
   }
   while (!Pipe::ended_) {

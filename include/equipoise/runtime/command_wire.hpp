@@ -23,17 +23,17 @@ class CommandWire {
 
   /// At most this long, ms.
   virtual void listen(int milliseconds, const Received& received) = 0;
-  virtual void say(const std::uint8_t* message, std::size_t size) = 0;
+  virtual void say(const std::vector<std::uint8_t>& message) = 0;
   /// Commands may follow each other at this interval without queueing up on the way.
   virtual double interval_s() const { return 0.05; }
 };
 
-/// An LCM message, encoded.
+/// An LCM message.
 template <class Message>
-void say(CommandWire& wire, const Message& message) {
+std::vector<std::uint8_t> encoded(const Message& message) {
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  wire.say(bytes.data(), bytes.size());
+  return bytes;
 }
 
 enum class WireSide { kRobot, kOwner };  // the robot hears commands and says its session
@@ -61,7 +61,7 @@ class StreamWire final : public CommandWire {
   explicit StreamWire(std::unique_ptr<ByteStream> stream) : stream_(std::move(stream)) {}
 
   void listen(int milliseconds, const Received& received) override;
-  void say(const std::uint8_t* message, std::size_t size) override;
+  void say(const std::vector<std::uint8_t>& message) override;
   double interval_s() const override;
 
  private:

@@ -148,23 +148,12 @@ void walk(Message message, const Record& record, std::int64_t utime, std::int64_
 }
 
 template <class Message, class Record>
-std::size_t encoded_size(Message message, const Record& record) {
-  wire::Encoder counting(nullptr);
-  walk(message, record, 0, 0, counting);
-  return counting.size();
-}
-
-/// `to`: room for encoded_size() bytes.
-template <class Message, class Record>
-void encode(Message message, const Record& record, std::int64_t utime, std::int64_t tick, std::uint8_t* to) {
-  wire::Encoder encoder(to);
-  walk(message, record, utime, tick, encoder);
-}
-
-template <class Message, class Record>
 void encode(Message message, const Record& record, std::int64_t utime, std::int64_t tick, Bytes* out) {
-  out->resize(encoded_size(message, record));
-  encode(message, record, utime, tick, out->data());
+  wire::Encoder counting(nullptr);
+  walk(message, record, utime, tick, counting);
+  out->resize(counting.size());
+  wire::Encoder writing(out->data());
+  walk(message, record, utime, tick, writing);
 }
 
 /// False, and `record` is undefined, unless these are the bytes of one such message. `tick` may stay as it

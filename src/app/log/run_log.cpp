@@ -20,14 +20,6 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-/// utime and tick only where they are those of `tick`.
-template <class Message, class Record>
-bool decode_of_tick(Message message, const LogEvent& event, const TickRecord& tick, Record* record) {
-  std::int64_t utime = 0;
-  std::int64_t number = 0;
-  return runtime::decode(message, event.data, record, &utime, &number) && number == tick.tick;
-}
-
 }  // namespace
 
 std::string short_name(std::string_view channel) {
@@ -84,33 +76,33 @@ bool RunLog::next(TickRecord* tick) {
 }
 
 void RunLog::take(const LogEvent& event) {
+  const auto decoded = [&](auto message, auto* record) {
+    std::int64_t utime = 0;
+    std::int64_t tick = 0;
+    return runtime::decode(message, event.data, record, &utime, &tick) && tick == tick_.tick;
+  };
   if (event.channel == fields::kTruthChannel) {
-    tick_.has_truth = decode_of_tick(fields::State{}, event, tick_, &tick_.truth);
+    tick_.has_truth = decoded(fields::State{}, &tick_.truth);
   } else if (event.channel == fields::kEndChannel) {
     runtime::EndRecord end;
-    if (decode_of_tick(fields::End{}, event, tick_, &end)) end_ = end;
+    if (decoded(fields::End{}, &end)) end_ = end;
   } else if (event.channel.substr(0, fields::kComparedChannel.size()) == fields::kComparedChannel) {
-    take_compared(event);
+    const std::string name = lower(event.channel.substr(fields::kComparedChannel.size()));
+    const auto found = std::find(estimators_.begin(), estimators_.end(), name);
+    const auto i = static_cast<std::size_t>(found - estimators_.begin());
+    if (i >= runtime::kMaxEstimators || !decoded(fields::State{}, &tick_.others[i])) return;
+    if (found == estimators_.end()) estimators_.push_back(name);
+    tick_.compared |= 1U << i;
   } else {
     unsigned bit = 1;
     fields::each_message(tick_, [&](auto message, std::string_view channel, auto& record) {
       if (channel == event.channel) {
-        torn_ = torn_ || !decode_of_tick(message, event, tick_, &record);
+        torn_ = torn_ || !decoded(message, &record);
         seen_ |= bit;
       }
       bit <<= 1U;
     });
   }
-}
-
-void RunLog::take_compared(const LogEvent& event) {
-  const std::string name = lower(event.channel.substr(fields::kComparedChannel.size()));
-  const auto found = std::find(estimators_.begin(), estimators_.end(), name);
-  const auto i = static_cast<std::size_t>(found - estimators_.begin());
-  if (i >= runtime::kMaxEstimators) return;
-  if (!decode_of_tick(fields::State{}, event, tick_, &tick_.others[i])) return;
-  if (found == estimators_.end()) estimators_.push_back(name);
-  tick_.compared |= 1U << i;
 }
 
 Command command_of(const TickRecord& r) noexcept {

@@ -34,7 +34,6 @@ class RunLog {
   void find_run(LogReader reader, const std::string& origin);
   bool finish(runtime::TickRecord* tick);
   void take(const LogEvent& event);
-  void take_compared(const LogEvent& event);
 
   LogReader reader_;
   runtime::RunInfo run_;

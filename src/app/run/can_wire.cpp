@@ -44,9 +44,9 @@ void CanWire::listen(int milliseconds, const Received& received) {
   }
 }
 
-void CanWire::say(const std::uint8_t* message, std::size_t size) {
+void CanWire::say(const std::vector<std::uint8_t>& message) {
   constexpr int kPatience_ms = 100;  // the interface's queue holds ten frames; a dead bus loses the rest
-  const std::vector<std::uint8_t> bytes = runtime::to_frame(message, size);
+  const std::vector<std::uint8_t> bytes = runtime::to_frame(message.data(), message.size());
   int waited_ms = 0;
   for (std::size_t at = 0; at < bytes.size() && waited_ms < kPatience_ms;) {
     can_frame frame{};

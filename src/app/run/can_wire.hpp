@@ -33,7 +33,7 @@ class CanWire final : public runtime::CommandWire {
   CanWire(std::unique_ptr<CanBus> bus, runtime::WireSide side);
 
   void listen(int milliseconds, const Received& received) override;
-  void say(const std::uint8_t* message, std::size_t size) override;
+  void say(const std::vector<std::uint8_t>& message) override;
 
  private:
   /// True when it completed a message.

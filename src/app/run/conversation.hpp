@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -13,6 +14,14 @@
 #include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
+
+struct LiveRequest {
+  std::int8_t action = signed_command_t::ASK;  // ASK: take the turn that is now as one's own
+  runtime::CommandSender::Motion motion{};     // of DRIVE
+};
+
+/// m/s, m/s, turns per second, within the ranges of --drive-mps and --yaw-hz; nothing for any other line.
+std::optional<LiveRequest> live_request(const std::string& line);
 
 struct SendArguments {
   std::string key;
@@ -47,7 +56,7 @@ class Conversation {
   using Link = runtime::CommandSender::Link;
 
   void listen(double seconds);
-  void say(const signed_command_t& m) { runtime::say(*wire_, m); }
+  void say(const signed_command_t& m) { wire_->say(runtime::encoded(m)); }
   bool begin_turn(Link* link, std::int8_t action);
   Link& robot() { return sender_.links().front(); }
   bool confirms_more() { return robot().confirmed < robot().signed_up_to; }

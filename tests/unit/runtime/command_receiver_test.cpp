@@ -41,9 +41,10 @@ class MemoryWire final : public CommandWire {
     lock.unlock();
     received(message.data(), message.size());
   }
-  void say(const std::uint8_t* message, std::size_t size) override {
+  void say(const Bytes& message) override {
     command_session_t said;
-    ASSERT_EQ(said.decode(message, 0, static_cast<int>(size)), static_cast<int>(size));
+    const auto size = static_cast<int>(message.size());
+    ASSERT_EQ(said.decode(message.data(), 0, size), size);
     const std::lock_guard lock(line_->mutex);
     line_->from_robot.push_back(said);
     line_->news.notify_all();
@@ -89,11 +90,6 @@ class Receiver : public ::testing::Test {
     const std::lock_guard lock(line_.mutex);
     line_.to_robot.push_back(bytes);
     line_.news.notify_all();
-  }
-  static Bytes encoded(const signed_command_t& m) {
-    Bytes bytes(static_cast<std::size_t>(m.getEncodedSize()));
-    m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    return bytes;
   }
   signed_command_t command(std::int8_t action) {
     return sender_.sign(&link(), link().turn, action, {{0.1, 0.2}, 0.3});
@@ -270,13 +266,13 @@ class OnAStream : public ::testing::Test {
 };
 
 TEST_F(OnAStream, AWholeFrameIsSaidThroughALineThatTakesLittleAtATime) {
-  wire_.say(message_.data(), message_.size());
+  wire_.say(message_);
   EXPECT_EQ(line_.taken, to_frame(message_.data(), message_.size()));
 }
 
 TEST_F(OnAStream, ADeadLineIsGivenUpSoon) {
   line_.room = 0;
-  wire_.say(message_.data(), message_.size());
+  wire_.say(message_);
   EXPECT_TRUE(line_.taken.empty());
   EXPECT_EQ(line_.writes, 100) << "a millisecond each";
 }
@@ -314,7 +310,7 @@ TEST(LcmWire, CarriesCommandsOneWayAndSessionsTheOther) {
     const auto received = [&](const std::uint8_t* data, std::size_t size) {
       heard.emplace_back(data, data + size);
     };
-    from.say(message.data(), message.size());
+    from.say(message);
     for (int i = 0; i < 100 && heard.empty(); ++i) to.listen(50, received);
     from.listen(1, [](const std::uint8_t*, std::size_t) { ADD_FAILURE() << "hears itself"; });
     return heard == std::vector<Bytes>{message};

@@ -17,7 +17,6 @@
 #include "equipoise/runtime/log_parts.hpp"
 #include "runtime/log_writer.hpp"
 #include "support/file_size_limit.hpp"
-#include "support/log_event.hpp"
 #include "support/log_folder.hpp"
 
 namespace equipoise::runtime {
@@ -31,8 +30,8 @@ class LogWriterFailures : public LogFolder {
  protected:
   // Two events of 100 bytes.
   static void write_tick(LogWriter* log) {
-    write_event(log, 0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
-    write_event(log, 0, "CHANNEL2", std::vector<std::uint8_t>(100 - 28 - 8));
+    log->event(0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
+    log->event(0, "CHANNEL2", std::vector<std::uint8_t>(100 - 28 - 8));
     log->end_tick();
   }
   void write(const std::string& name, const std::string& text) const {
@@ -90,7 +89,7 @@ TEST_F(LogWriterFailures, AnEventThatCannotBeCutBackIsSaidToBeTorn) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     close(reader);
   });
-  write_event(&log, 0, "CHANNEL1", std::vector<std::uint8_t>(4 << 20));  // more than a pipe holds
+  log.event(0, "CHANNEL1", std::vector<std::uint8_t>(4 << 20));  // more than a pipe holds
   log.end_tick();
   leaves.join();
   std::signal(SIGPIPE, before);
@@ -122,7 +121,7 @@ TEST_F(LogWriterFailures, AWriteThatASignalInterruptsGoesOn) {
     for (ssize_t n = 0; (n = read(reader, some.data(), some.size())) > 0;)
       received.append(some.data(), static_cast<std::size_t>(n));
   });
-  write_event(&log, 0, "C", data);
+  log.event(0, "C", data);
   log.end_tick();
   EXPECT_EQ(log.error(), "");
   log.close();

@@ -13,7 +13,6 @@
 #include <limits>
 
 #include "equipoise/runtime/log_parts.hpp"
-#include "support/log_event.hpp"
 #include "support/log_folder.hpp"
 
 namespace equipoise::runtime {
@@ -27,8 +26,8 @@ class LogWriterTest : public LogFolder {
  protected:
   // Two events of 100 bytes.
   static void write_tick(LogWriter* log) {
-    write_event(log, 0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
-    write_event(log, 0, "CHANNEL2", std::vector<std::uint8_t>(100 - 28 - 8));
+    log->event(0, "CHANNEL1", std::vector<std::uint8_t>(100 - 28 - 8));
+    log->event(0, "CHANNEL2", std::vector<std::uint8_t>(100 - 28 - 8));
     log->end_tick();
   }
   void write(const std::string& name, const std::string& text) const {
@@ -40,9 +39,9 @@ TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
   LogWriter log;
   ASSERT_TRUE(log.open(path_, {}));
   for (std::uintmax_t tick = 0; tick < 3; ++tick) {
-    write_event(&log, 0, "CHANNEL1", std::vector<std::uint8_t>(64));
+    log.event(0, "CHANNEL1", std::vector<std::uint8_t>(64));
     EXPECT_EQ(fs::file_size(path_), tick * 200);
-    write_event(&log, 0, "CHANNEL2", std::vector<std::uint8_t>(64));
+    log.event(0, "CHANNEL2", std::vector<std::uint8_t>(64));
     log.end_tick();
     EXPECT_EQ(fs::file_size(path_), (tick + 1) * 200);
   }
@@ -89,8 +88,8 @@ TEST_F(LogWriterTest, ALogWhoseFurtherPartSomebodyWritesIsNotTaken) {
 TEST_F(LogWriterTest, AnEventIsWhatLcmsLogsHold) {
   LogWriter log;
   ASSERT_TRUE(log.open(path_, {}));
-  write_event(&log, 1, "A", {0xAA});
-  write_event(&log, 0x0102030405060708, "CH", {0xBB, 0xCC, 0xDD});
+  log.event(1, "A", {0xAA});
+  log.event(0x0102030405060708, "CH", {0xBB, 0xCC, 0xDD});
   log.end_tick();
   std::string bytes;
   std::getline(std::ifstream(path_, std::ios::binary), bytes, '\n');
@@ -142,7 +141,7 @@ TEST_F(LogWriterTest, AnEventMayBeLargerThanAllBeforeIt) {
   constexpr std::size_t kHead = 28 + 1;  // with the channel
   std::size_t at = 0;
   for (const std::size_t size : {1U, 100U, 5000U, 300000U, 7U}) {
-    write_event(&log, 0, "C", std::vector<std::uint8_t>(size, 'x'));
+    log.event(0, "C", std::vector<std::uint8_t>(size, 'x'));
     log.event(0, "D", {});
     log.end_tick();
     std::ifstream file(path_, std::ios::binary);
@@ -187,7 +186,7 @@ TEST_F(LogWriterTest, WhatWasNotYetWrittenIsWrittenAtTheEnd) {
   {
     LogWriter log;
     ASSERT_TRUE(log.open(path_, {}));
-    write_event(&log, 0, "CHANNEL1", std::vector<std::uint8_t>(64));
+    log.event(0, "CHANNEL1", std::vector<std::uint8_t>(64));
   }
   EXPECT_EQ(fs::file_size(path_), 100U);
 }
