@@ -27,13 +27,16 @@ struct KeyFacts {
   std::string allowed;  // what reading it asks for
 };
 
-/// A robot's configuration as it was read.
-template <class Config>
-struct Loaded {
-  Config config;
+/// A configuration file that was read.
+struct LoadedFile {
   std::vector<KeyFacts> keys{};  // in the order of reading
   std::string sha256;            // of the effective configuration
   std::string toml;              // the effective configuration
+};
+/// A robot's configuration as it was read.
+template <class Config>
+struct Loaded : LoadedFile {
+  Config config;
 };
 
 }  // namespace equipoise

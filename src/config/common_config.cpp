@@ -235,6 +235,11 @@ void read_disturbance(Section& s, WorldParams* w) {
 
 }  // namespace
 
+LoadedFile loaded(const Document& document) {
+  check_population(document.root());
+  return {document.keys(), document.sha256(), document.canonical()};
+}
+
 WorldParams read_world(Section s, BridgeType* bridge, const RobotsOwn& own) {
   WorldParams w;
   *bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;

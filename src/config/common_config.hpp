@@ -42,13 +42,8 @@ void read_surroundings(Section& root, const Vec3& imu_position_m,
 /// A design that does not exist, at the key that is the cause.
 [[noreturn]] void refuse(const DesignProblem& problem, const Section& controller, const Section& robot);
 
-/// `read`: the whole file.
-template <class Config>
-Loaded<Config> loaded(const Document& document, Config (*read)(Section root)) {
-  Config config = read(Section(document, document.root(), ""));
-  check_population(document.root());
-  return {std::move(config), document.keys(), document.sha256(), document.canonical()};
-}
+/// When all of it has been read.
+LoadedFile loaded(const Document& document);
 
 /// What of a world only one robot has.
 struct RobotsOwn {

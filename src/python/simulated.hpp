@@ -98,7 +98,7 @@ class SimulatedOf : public Simulated {
     params.common.seed = request.seed;
     const auto engine = make(Access::dimensions(config.robot, params));
     app::WorldOf<Firmware, EngineWorld> world(
-        config, std::tie(config.robot, config.motor, config.calibration, params, *engine));
+        config, EngineWorld(config.robot, config.motor, config.calibration, params, *engine));
     const app::SimSummary summary =
         Firmware::with_pipeline(config, request.choice.controller, [&](auto& own) {
           app::FirmwareOf<Firmware, std::decay_t<decltype(own)>, EngineWorld> firmware(own.params());

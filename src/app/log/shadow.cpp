@@ -112,7 +112,7 @@ Shadow shadow_log(RunLog& log, const std::string& origin, const std::string& con
     const auto loaded = config.empty() ? Robot::parse(info.config_toml, origin + " (its configuration)", set)
                                        : Robot::load(config, set);
     Choice choice{"", "", info.backend == "import" ? "" : info.fidelity, false, "", ""};
-    complete(type_as<Robot>(), &choice);
+    complete(ConfiguredRobotOf<Robot>::robot_type(), &choice);
     const auto c = Robot::apply(loaded.config, choice);
     Shadow out = Robot::with_pipeline(c, choice.controller, [&](auto& pipeline) {
       return ShadowRun<std::decay_t<decltype(pipeline)>>(pipeline.params(), Robot::rolling_radius_m(c),

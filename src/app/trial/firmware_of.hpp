@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 #include "app/trial/firmware.hpp"
@@ -17,10 +16,8 @@ class WorldOf : public World {
  public:
   WorldOf(const typename Robot::Config& config, const Choice& choice, std::uint64_t seed)
       : world(Robot::world(config, fidelity_level(choice.fidelity), seed)), robot_(config.robot) {}
-  /// A world that is built from these.
-  template <class... Parts>
-  WorldOf(const typename Robot::Config& config, const std::tuple<Parts...>& parts)
-      : world(std::make_from_tuple<Simulated>(parts)), robot_(config.robot) {}
+  WorldOf(const typename Robot::Config& config, const Simulated& built)
+      : world(built), robot_(config.robot) {}
 
   void advance(const MotorCommand& command) override { world.advance(command); }
   RawSample sense() override { return world.sense(); }
@@ -120,13 +117,10 @@ class FirmwareOf : public Firmware {
 };
 
 template <class Robot>
-const RobotType& type_as();
-
-template <class Robot>
 class ConfiguredRobotOf : public ConfiguredRobot {
  public:
   explicit ConfiguredRobotOf(typename Robot::Loaded loaded) : config(std::move(loaded.config)) {
-    type = &type_as<Robot>();
+    type = &robot_type();
     sha256 = std::move(loaded.sha256);
     toml = std::move(loaded.toml);
     keys = std::move(loaded.keys);
@@ -164,32 +158,31 @@ class ConfiguredRobotOf : public ConfiguredRobot {
     });
   }
 
+  /// The robot's entry in the list of types.
+  static const RobotType& robot_type() {
+    static const RobotType type{
+        Robot::kName,
+        Robot::estimators(),
+        Robot::controllers(),
+        Robot::kDefaultEstimator,
+        Robot::kDefaultController,
+        Robot::kSpeedRmseKey,
+        Robot::kSpeedLabel,
+        Robot::kSpeedUnit,
+        Robot::kSpeedScale,
+        Robot::kDrivesSideways,
+        Robot::kForward_rad,
+        [](const std::string& path, const Overrides& overrides) -> std::unique_ptr<const ConfiguredRobot> {
+          return std::make_unique<ConfiguredRobotOf>(Robot::load(path, overrides));
+        },
+        [](const std::string& text, const std::string& origin,
+           const std::vector<std::string>& set) -> std::unique_ptr<const ConfiguredRobot> {
+          return std::make_unique<ConfiguredRobotOf>(Robot::parse(text, origin, set));
+        }};
+    return type;
+  }
+
   typename Robot::Config config;
 };
-
-/// The robot's entry in the list of types.
-template <class Robot>
-const RobotType& type_as() {
-  static const RobotType type{
-      Robot::kName,
-      Robot::estimators(),
-      Robot::controllers(),
-      Robot::kDefaultEstimator,
-      Robot::kDefaultController,
-      Robot::kSpeedRmseKey,
-      Robot::kSpeedLabel,
-      Robot::kSpeedUnit,
-      Robot::kSpeedScale,
-      Robot::kDrivesSideways,
-      Robot::kForward_rad,
-      [](const std::string& path, const Overrides& overrides) -> std::unique_ptr<const ConfiguredRobot> {
-        return std::make_unique<ConfiguredRobotOf<Robot>>(Robot::load(path, overrides));
-      },
-      [](const std::string& text, const std::string& origin,
-         const std::vector<std::string>& set) -> std::unique_ptr<const ConfiguredRobot> {
-        return std::make_unique<ConfiguredRobotOf<Robot>>(Robot::parse(text, origin, set));
-      }};
-  return type;
-}
 
 }  // namespace equipoise::app

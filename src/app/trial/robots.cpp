@@ -7,7 +7,7 @@ namespace equipoise::app {
 const std::vector<const RobotType*>& robot_types() {
   static const std::vector<const RobotType*> types = [] {
     std::vector<const RobotType*> all;
-    for_each_robot([&](auto robot) { all.push_back(&type_as<decltype(robot)>()); });
+    for_each_robot([&](auto robot) { all.push_back(&ConfiguredRobotOf<decltype(robot)>::robot_type()); });
     return all;
   }();
   return types;

@@ -157,7 +157,8 @@ MbbrWorldParams read_mbbr_world(Section s, BridgeType* bridge) {
   return w;
 }
 
-MbbrConfig read_mbbr(Section root) {
+Loaded<MbbrConfig> read_mbbr(const Document& document) {
+  Section root(document, document.root(), "");
   MbbrConfig c;
   Section robot = root.table("robot");
   config::expect_robot(robot, "mbbr");
@@ -197,18 +198,18 @@ MbbrConfig read_mbbr(Section root) {
       },
       &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
-  return c;
+  return {config::loaded(document), c};
 }
 
 }  // namespace
 
 Loaded<MbbrConfig> load_mbbr(const std::string& path, const Overrides& overrides) {
-  return config::loaded(Document(path, overrides), read_mbbr);
+  return read_mbbr(Document(path, overrides));
 }
 
 Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin,
                               const std::vector<std::string>& set) {
-  return config::loaded(Document::parse(text, origin, set), read_mbbr);
+  return read_mbbr(Document::parse(text, origin, set));
 }
 
 MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {

@@ -139,7 +139,8 @@ MipWorldParams read_mip_world(Section s, BridgeType* bridge) {
   return w;
 }
 
-MipConfig read_mip(Section root) {
+Loaded<MipConfig> read_mip(const Document& document) {
+  Section root(document, document.root(), "");
   MipConfig c;
   Section robot = root.table("robot");
   config::expect_robot(robot, "mip");
@@ -173,18 +174,18 @@ MipConfig read_mip(Section root) {
       },
       &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
-  return c;
+  return {config::loaded(document), c};
 }
 
 }  // namespace
 
 Loaded<MipConfig> load_mip(const std::string& path, const Overrides& overrides) {
-  return config::loaded(Document(path, overrides), read_mip);
+  return read_mip(Document(path, overrides));
 }
 
 Loaded<MipConfig> parse_mip(const std::string& text, const std::string& origin,
                             const std::vector<std::string>& set) {
-  return config::loaded(Document::parse(text, origin, set), read_mip);
+  return read_mip(Document::parse(text, origin, set));
 }
 
 MipSlcPipeline::Params MipConfig::slc_pipeline() const {

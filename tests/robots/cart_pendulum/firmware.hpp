@@ -116,7 +116,7 @@ inline std::string config_file<CartPendulumFirmware>() {
 
 template <>
 inline const app::RobotType& type_of<CartPendulumFirmware>() {
-  return app::type_as<CartPendulumFirmware>();
+  return app::ConfiguredRobotOf<CartPendulumFirmware>::robot_type();
 }
 
 }  // namespace equipoise
