@@ -1,8 +1,7 @@
 // The lines of `equipoise send --live`.
-#include "app/run/relay.hpp"
-
 #include <gtest/gtest.h>
 
+#include "app/run/conversation.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise::app {

@@ -1,12 +1,11 @@
 // The parts of a replay: errors against the truth, the first number that differs, what counts and what is
 // judged.
-#include "app/log/replay_parts.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
+#include "app/log/replay.hpp"
 #include "robots/mbbr/mbbr.hpp"
 #include "robots/mip/mip.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <exception>
 
-#include "app/log/replay_parts.hpp"
+#include "app/log/replay.hpp"
 #include "app/text/errors.hpp"
 #include "equipoise/runtime/fields.hpp"
 #include "equipoise/runtime/loop.hpp"

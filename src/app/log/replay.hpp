@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "app/log/replay.hpp"
 #include "app/log/run_log.hpp"
 #include "app/text/json.hpp"
 #include "app/trial/firmware.hpp"
@@ -82,5 +83,19 @@ struct Beside {
 Replay replay_log(RunLog& log, const std::string& origin, const Beside& beside);
 /// The same, of a robot that need not be one of this build.
 Replay replay_as(const RobotType& robot, RunLog& log, const std::string& origin, const Beside& beside = {});
+
+// Parts of a replay, for its tests.
+
+/// The first number that differs: bit for bit, but any NaN is any other.
+void compare(const runtime::TickRecord& logged, const runtime::TickRecord& replayed, Difference* difference);
+
+/// One tick of both into the comparison.
+void compare_tunings(const runtime::TickRecord& recorded, const runtime::TickRecord& retuned, Retuned* out);
+
+/// As the run judged it.
+VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept;
+
+/// What counts, as in sim: from the fifth second on; simulated clocks start at 0.
+bool settled(const runtime::TickRecord& r) noexcept;
 
 }  // namespace equipoise::app

@@ -1,7 +1,5 @@
 // `equipoise send --live`: requests come in as lines while it runs, what the robot confirms goes out as JSON
 // lines. Every motion is one signed command: who stops writing stops the motion by the robot's dead man.
-#include "app/run/relay.hpp"
-
 #include <poll.h>
 #include <unistd.h>
 

@@ -11,7 +11,6 @@
 #include "app/run/runner.hpp"
 #include "app/run/wires.hpp"
 #include "app/text/files.hpp"
-#include "app/trial/log_name.hpp"
 #include "bbb.h"
 #include "config/population.hpp"
 

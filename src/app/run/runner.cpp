@@ -1,19 +1,126 @@
 #include "app/run/runner.hpp"
 
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
+#include <string>
 
 #include "app/cli/interrupt.hpp"
 #include "app/guard/service_notify.hpp"
 #include "app/io/hardware.hpp"
 #include "app/remote/hand_remote.hpp"
-#include "app/run/journal.hpp"
-#include "app/run/trial_observer.hpp"
+#include "app/run/run_arguments.hpp"
+#include "app/run/status_indicator.hpp"
 #include "app/run/wires.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
+#include "equipoise/runtime/loop.hpp"
+#include "equipoise/runtime/supervisor.hpp"
+#include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {
 namespace {
+
+struct TrialLimits {
+  double duration_s = 0.0;  // 0: until the backend or a signal ends it
+  bool end_on_fall = true;
+
+  std::int64_t last_tick() const {
+    return duration_s > 0.0 ? std::llround(duration_s * kTickHz) - 1 : INT64_MAX;
+  }
+};
+
+/// One trial: every tick is judged, recorded and shown, and the last one recognised. operator() is RT-safe.
+class TrialObserver {
+ public:
+  /// `indicator` may be nullptr.
+  TrialObserver(const runtime::Supervisor& supervisor, runtime::Telemetry& telemetry,
+                StatusIndicator* indicator, const TrialLimits& limits)
+      : supervisor_(supervisor),
+        telemetry_(telemetry),
+        indicator_(indicator),
+        last_tick_(limits.last_tick()),
+        end_on_fall_(limits.end_on_fall) {}
+
+  void operator()(std::int64_t tick, const runtime::TickRecord& t) noexcept {
+    const auto arm_state = static_cast<ArmState>(t.arm_state);
+    judge_.observe({static_cast<double>(tick) * kTickS, t.arm, arm_state == ArmState::kArmed, t.reasons,
+                    std::numeric_limits<double>::quiet_NaN(), reason_numbers(t)});
+    measure(t);
+    record(tick, t);
+    if (indicator_ != nullptr) indicator_->tell(arm_state, t.reasons, t.battery_V);
+    const bool unrecorded = (t.inhibit & kLogFailed) != 0;  // the motors are off for it
+    if (tick >= last_tick_ || (judge_.lost() && end_on_fall_) || unrecorded ||
+        interrupted.load(std::memory_order_relaxed))
+      done_ = true;
+  }
+
+  const std::atomic<bool>& done() const noexcept { return done_; }
+
+  Trial trial(const runtime::LoopEnd& end) const {
+    Trial out = trial_;
+    out.ticks = end.ticks;
+    out.error = end.error;
+    out.armed = judge_.armed();
+    out.verdict = judge_.verdict(interrupted.load(), end.error != 0 && end.error != -ESHUTDOWN);
+    return out;
+  }
+
+ private:
+  void measure(const runtime::TickRecord& t) noexcept {
+    if (!t.motors.enable) return;
+    ++trial_.driven;
+    trial_.saturated += t.saturated ? 1 : 0;
+    for (const double duty : t.motors.duty) trial_.duty_max = std::max(trial_.duty_max, std::abs(duty));
+  }
+
+  void record(std::int64_t tick, const runtime::TickRecord& t) noexcept {
+    record_ = t;
+    record_.tick = tick;
+    const runtime::TickTiming& timing = supervisor_.timing().now();
+    record_.wake_late_ns = timing.wake_late_ns;
+    record_.compute_ns = timing.compute_ns;
+    record_.overruns = timing.overruns;
+    record_.dropped_records = telemetry_.dropped();
+    telemetry_.hand_over(record_);
+  }
+
+  const runtime::Supervisor& supervisor_;
+  runtime::Telemetry& telemetry_;
+  StatusIndicator* indicator_;
+  std::int64_t last_tick_;
+  bool end_on_fall_;
+  VerdictJudge judge_;
+  Trial trial_;
+  runtime::TickRecord record_{};
+  std::atomic<bool> done_{false};
+};
+
+/// Who commands, on stderr; nothing where a terminal or a pipe would have to be waited for.
+void journal(const std::string& what) {
+  const std::string line = "equipoise: " + what + "\n";
+  struct stat about {};
+  if (fstat(STDERR_FILENO, &about) != 0) return;
+  ssize_t written = 0;
+  if (S_ISREG(about.st_mode)) {
+    written = write(STDERR_FILENO, line.data(), line.size());
+  } else if (S_ISSOCK(about.st_mode)) {  // the system's journal
+    written = send(STDERR_FILENO, line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  } else {
+    // Opened anew: O_NONBLOCK on the descriptor itself would be everybody's who shares it.
+    static const int fd = open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd >= 0) written = write(fd, line.data(), line.size());
+  }
+  (void)written;
+}
 
 /// run.lcm, run-2.lcm, run-3.lcm: a new engine is a new trial.
 std::string numbered(const std::string& path, int trial) {

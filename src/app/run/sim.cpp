@@ -7,7 +7,7 @@
 #include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
 #include "app/sim/sim_job.hpp"
-#include "app/trial/log_name.hpp"
+#include "app/text/files.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {

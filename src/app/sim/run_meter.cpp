@@ -1,7 +1,7 @@
-#include "app/sim/run_meter.hpp"
-
 #include <algorithm>
 #include <cmath>
+
+#include "app/sim/simulate.hpp"
 
 namespace equipoise::app {
 

@@ -6,6 +6,10 @@
 
 namespace equipoise::app {
 
+/// Where a run's log goes when nobody says: logs/KIND-ROBOT-TIME.lcm, of a name that does not exist yet;
+/// makes the folder.
+std::string new_log_name(const std::string& kind, const std::string& robot);
+
 /// A whole file; InputError names it.
 std::string read_text(const std::string& path);
 
