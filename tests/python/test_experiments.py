@@ -265,7 +265,7 @@ def test_the_quick_experiments_run(tmp_path):
     lab = runs.Lab(seeds=2)
     for name in ("geometry", "motor_selection", "friction_identification", "published_gains"):
         module = framework.load(name)
-        data.write(name, module.measure(lab), tmp_path)
+        data.write(name, framework.measured(module, lab), tmp_path)
         assert module.report(data.read(name, tmp_path), tmp_path).findings
 
 

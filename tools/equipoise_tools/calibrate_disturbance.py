@@ -20,7 +20,7 @@ import numpy as np
 
 from . import published
 from .entry import leave
-from .experiments.runs import simulate, summarise
+from .experiments.runs import summarise
 from .paths import UserError, repository_root
 
 # Yaw rate in Hz, drive speed in m/s, RMSE of the attitude in rad and of the ball speed in m/s.
@@ -70,11 +70,6 @@ def options(row: tuple, duration_s: float, seed: int) -> dict:
         "duration_s": duration_s,
         "seed": seed,
     }
-
-
-def run_row(sets: dict[str, str], row: tuple, duration_s: float, seed: int = 1):
-    """(summary, log) of a driving condition."""
-    return simulate(sets=sets, compare=True, **options(row, duration_s, seed))
 
 
 def ratios(summary: dict, row: tuple) -> tuple[float, float]:

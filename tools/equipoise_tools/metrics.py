@@ -16,7 +16,6 @@ FALLEN_RAD = 0.6  # the safety gate's default tilt limit
 # The verdict's words and limits are those of src/app/trial/verdict.cpp.
 SURELY_FALLING_RAD = 0.9 * FALLEN_RAD
 PATIENCE_S = 0.1  # between the request and armed motors
-SATURATED = 1.0 - 1e-9
 
 
 @dataclass

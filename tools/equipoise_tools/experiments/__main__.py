@@ -19,7 +19,7 @@ def run_one(name: str, out_dir: Path, lab: Lab | None) -> list[str]:
     """Measures, unless `lab` is None, and writes the page from the data. Texts that do not hold."""
     module = framework.load(name)
     if lab is not None:
-        data.write(name, module.measure(lab), out_dir)
+        data.write(name, framework.measured(module, lab), out_dir)
     result = module.report(data.read(name, out_dir), out_dir)
     framework.write(name, result, out_dir)
     return [f"{f.target}: {f.text} ({f.ran})" for f in result.findings if not f.holds]

@@ -11,7 +11,7 @@ from .. import metrics, names, style
 from ..style import plt
 from .data import Data
 from .framework import Result
-from .runs import BUILT, MIP, Case, Lab
+from .runs import BUILT, MIP, Case
 
 COVERS = ("Fig. 4.6", "Fig. 4.6, 1 kHz", "Fig. 4.6, uncompensated at 10 and 20 kHz")
 PWM_HZ = (500, 1000, 5000, 10000, 20000)
@@ -49,10 +49,6 @@ def cases() -> list[Case]:
                 name = case_name(world, mode, pwm_hz)
                 found.append(Case(name, MIP, bridge | sets | NO_PROBE, options, measure=lean_variance))
     return found
-
-
-def measure(lab: Lab) -> Data:
-    return lab.run(cases())
 
 
 def report(data: Data, out_dir: Path) -> Result:

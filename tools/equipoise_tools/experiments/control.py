@@ -12,7 +12,7 @@ from ..style import plt
 from . import timeplot
 from .data import Data
 from .framework import Result
-from .runs import AS_PUBLISHED, BUILT, MBBR, NO_GATES, Case, Lab
+from .runs import AS_PUBLISHED, BUILT, MBBR, NO_GATES, Case
 
 CONDITIONS = ((0.5, 0.20), (0.75, 0.15), (1.0, 0.10), (1.5, 0.05))
 EKF_FIGURES = tuple(f"Fig. 6.{n}" for n in range(25, 29))
@@ -109,10 +109,6 @@ def cases() -> list[Case]:
         Case("simulation, ours", sets=NO_GATES, options=options, trace=trace, trace_s=(0.0, 20.0)),
     ]
     return found
-
-
-def measure(lab: Lab) -> Data:
-    return lab.run(cases())
 
 
 def report(data: Data, out_dir: Path) -> Result:

@@ -13,7 +13,7 @@ from ..style import plt
 from . import published_kf, timeplot
 from .data import Data
 from .framework import Result
-from .runs import BUILT, NO_GATES, Case, Lab, equipoise_json
+from .runs import BUILT, NO_GATES, Case, equipoise_json
 
 YAW_HZ = (0.0, -1.5, -1.0, -0.75, -0.5, 0.5, 0.75, 1.0, 1.5)
 FIGURES = {hz: f"Fig. 6.{15 + i}" for i, hz in enumerate(YAW_HZ)}
@@ -114,10 +114,6 @@ def cases() -> list[Case]:
         for hz in TABLE_6_2_HZ
     ]
     return found
-
-
-def measure(lab: Lab) -> Data:
-    return lab.run(cases())
 
 
 def report(data: Data, out_dir: Path) -> Result:

@@ -37,7 +37,6 @@ PUBLISHED_FILTERS = {
     "kf as published",
 }
 PUBLISHED_CONTROL = {"-", "thesis as published", "slc as published"}
-CLAIMS = ("[T]", "ours")
 RELATIONS = {
     "at least": lambda measured, limit: measured >= limit[0],
     "at most": lambda measured, limit: measured <= limit[0],
@@ -179,6 +178,11 @@ def names() -> list[str]:
 
 def load(name: str):
     return importlib.import_module(f"{__package__}.{name}")
+
+
+def measured(module, lab) -> Data:
+    """The module's own measurement, or runs of its cases."""
+    return module.measure(lab) if hasattr(module, "measure") else lab.run(module.cases())
 
 
 def number(value: float | None) -> str:

@@ -11,7 +11,7 @@ from .. import metrics, names, published, style
 from ..style import plt
 from .data import TRACE_HZ, Data
 from .framework import Result
-from .runs import BUILT, NO_GATES, Case, Lab, over_estimate
+from .runs import BUILT, NO_GATES, Case, over_estimate
 
 COVERS = ("Fig. 6.4", "Fig. 6.5", "Fig. 6.5, with compensation", "Fig. 6.8")
 PUBLISHED, CORRECTED = "ekf13_published", "ekf13"  # the same states; the model as published, and corrected
@@ -75,10 +75,6 @@ def cases() -> list[Case]:
         for world in WORLDS.values()
         for gain in GAINS
     ]
-
-
-def measure(lab: Lab) -> Data:
-    return lab.run(cases())
 
 
 def report(data: Data, out_dir: Path) -> Result:

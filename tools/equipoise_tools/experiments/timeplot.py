@@ -14,7 +14,6 @@ from ..style import plt
 from .data import TRACE_HZ, Data
 
 # What a trace holds of each filter; the suffix of a series.
-SHOWN = ("theta_x", "theta_y", "speed_x", "speed_y", "x", "y", "heading", "turn")
 
 
 def series_of(log: Log, channels: dict[str, str], position: bool = True) -> dict:
