@@ -225,7 +225,7 @@ class SimulatedOf : public Simulated {
     EngineEpisode(const Config& config, const app::SimRequest& request, const MakeEngine& make)
         : params_(config.world[fidelity_level(request.choice.fidelity)]),
           engine_((params_.common.seed = request.seed, make(Access::dimensions(config.robot, params_)))),
-          world_(config, std::tie(config.robot, config.motor, config.calibration, params_, *engine_)) {}
+          world_(config, EpisodeWorld(config.robot, config.motor, config.calibration, params_, *engine_)) {}
     virtual const MotorCommand* next_command() const noexcept = 0;
 
     std::decay_t<decltype(Config::world[0])> params_;

@@ -1,6 +1,6 @@
 // A rigid-body engine that is not ours, behind a simulated robot's own motors, gears, friction and sensors.
 // In: motor command per tick; torques at the joints and forces for each step of the engine -> out: raw
-// samples. Each robot's world in an engine (robots/*/engine_world.hpp) says what its joints are. Simulation
+// samples. Each robot's world in an engine says what its joints are. Simulation
 // only.
 #pragma once
 
