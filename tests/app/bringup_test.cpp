@@ -25,8 +25,8 @@ using ::testing::IsEmpty;
 const std::string kSource = EQUIPOISE_SOURCE_DIR;
 const std::string kMbbrBoard = kSource + "/config/boards/robotics_cape_mbbr.toml";
 
-StandSetup mbbr_setup() {
-  const MbbrConfig config = load_mbbr(kSource + "/config/mbbr.toml", {}).config;
+StandSetup mbbr_setup(const std::vector<std::string>& set = {}) {
+  const MbbrConfig config = load_mbbr(kSource + "/config/mbbr.toml", set).config;
   return {layout_of(config.robot, config.motor, config.calibration), Vec3::UnitY(), config.motor,
           config.calibration, config.world[static_cast<std::size_t>(Fidelity::kNominal)].common};
 }
@@ -42,6 +42,7 @@ std::vector<WheelFinding> pulses(const StandSetup& setup, SimulatedStand& robot)
   std::vector<WheelFinding> findings;
   for (int i = 0; i < setup.layout.wheels; ++i)
     findings.push_back(pulse(manual, setup.layout, setup.calibration, i));
+  refuse_wrong_azimuth(setup.layout, findings);
   settle(manual, setup.layout, &findings);
   return findings;
 }
@@ -70,6 +71,23 @@ TEST(Pulses, FindEveryFaultOfOrderAndSign) {
             "motor 1 turns wheel 2; motor 1 moves encoder 2; motor 2 turns wheel 1; motor 2 moves encoder 1");
   EXPECT_EQ(complaint_with(mip_setup(), {"motor-1-reversed"}), "motor 1 turns backwards");
   EXPECT_EQ(complaint_with(mip_setup(), {"encoder-2-reversed"}), "encoder 2 counts backwards");
+}
+
+TEST(Pulses, NameAnAzimuthThatIsNotTheConfigured) {
+  for (const double off_deg : {40.0, 60.0, -75.0}) {
+    const std::string set = "robot.wheel_azimuth_deg=" + std::to_string(-100.0 - off_deg);
+    const StandSetup built = mbbr_setup({"robot.wheel_azimuth_deg=-100"});
+    SimulatedStand robot(built, {});
+    try {
+      pulses(mbbr_setup({set}), robot);
+      ADD_FAILURE() << off_deg;
+    } catch (const JobError& error) {
+      EXPECT_THAT(error.what(),
+                  HasSubstr("robot.wheel_azimuth_deg is off: add " + std::to_string(std::lround(off_deg))));
+    }
+  }
+  SimulatedStand robot(mbbr_setup({"robot.wheel_azimuth_deg=-130"}), {});
+  EXPECT_THAT(complaint(pulses(mbbr_setup(), robot)), IsEmpty());  // 10 degrees: the gyro is not surer
 }
 
 TEST(Pulses, OfADeadMotorSayWhereToLook) {

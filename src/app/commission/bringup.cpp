@@ -46,6 +46,7 @@ std::vector<WheelFinding> pulse_all(Commissioning& commissioning) {
   findings.reserve(static_cast<std::size_t>(commissioning.layout().wheels));
   for (int i = 0; i < commissioning.layout().wheels; ++i)
     findings.push_back(pulse(*manual, commissioning.layout(), commissioning.calibration(), i));
+  refuse_wrong_azimuth(commissioning.layout(), findings);
   settle(*manual, commissioning.layout(), &findings);
   for (const WheelFinding& f : findings) say("  " + describe(f));
   return findings;

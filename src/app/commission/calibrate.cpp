@@ -131,6 +131,7 @@ Result calibrate_motors(Commissioning& commissioning, CalibrationFile* file, nlo
   findings.reserve(static_cast<std::size_t>(commissioning.layout().wheels));
   for (int i = 0; i < commissioning.layout().wheels; ++i)
     findings.push_back(pulse(*manual, commissioning.layout(), commissioning.calibration(), i));
+  refuse_wrong_azimuth(commissioning.layout(), findings);
   settle(*manual, commissioning.layout(), &findings);
   Result result;
   CalibrationFile::Motors motors{stamp_of(temperature), {}, {}, {}};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/import/wheel_order.hpp"
 #include "app/text/format.hpp"
 
 namespace equipoise::app {
@@ -164,10 +165,11 @@ Kick shake(ManualDrive& manual, const WheelLayout& layout, const Calibration& c,
 void judge(const WheelLayout& layout, const Kick& kick, WheelFinding* finding) {
   finding->kick_sigmas = kick.sigmas;
   if (kick.sigmas < kSureSigmas) return;
+  // What the wheel gains about its axis, the body loses.
+  finding->axis_B = -kick.share_B.cwiseProduct(layout.body_inertia_kg_m2).normalized();
   double best = 0.0;
   int wheel = -1;
   for (int i = 0; i < layout.wheels; ++i) {
-    // What the wheel gains about its axis, the body loses.
     const Vec3 expected =
         -layout.axis_B[static_cast<std::size_t>(i)].cwiseQuotient(layout.body_inertia_kg_m2);
     const double cosine = kick.share_B.dot(expected) / (kick.share_B.norm() * expected.norm());
@@ -230,6 +232,22 @@ WheelFinding pulse(ManualDrive& manual, const WheelLayout& layout, const Calibra
   judge(layout, shake(manual, layout, calibration, finding), &finding);
   manual.rest(0.3);
   return finding;
+}
+
+void refuse_wrong_azimuth(const WheelLayout& layout, const std::vector<WheelFinding>& findings) {
+  if (layout.wheels != 3 || !layout.told_apart_by_gyro()) return;
+  Mat3 configured, felt;
+  for (int i = 0; i < layout.wheels; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!findings[k].axis_B) return;
+    configured.col(i) = -layout.axis_B[k];  // the ball's, as wheel_order has them
+    felt.col(i) = -*findings[k].axis_B;
+  }
+  constexpr double kTurned_rad = 20.0 * kPi / 180.0;
+  const WheelOrder order = wheel_order(configured, felt);
+  if (std::abs(order.azimuth_rad) > kTurned_rad)
+    throw JobError("the wheels do not sit as the configuration says" + order.mistake +
+                   "; nothing was written");
 }
 
 void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFinding>* findings) {

@@ -46,10 +46,15 @@ struct WheelFinding {
   double kick_sigmas = 0.0;             // how clearly the gyro felt it
   std::optional<bool> turns_backwards;  // against the model; unknown where the kick is too weak
   std::optional<int> wheel;             // that it turns, from 0
+  std::optional<Vec3> axis_B;           // about which its wheel turned under positive duty; the gyro was sure
 };
 
 /// JobError when nothing moves, several wheels move, or the robot does.
 WheelFinding pulse(ManualDrive& manual, const WheelLayout& layout, const Calibration& calibration, int motor);
+
+/// JobError when the axes that the gyro felt are turned about the vertical against the configured ones: no
+/// board file can mend that.
+void refuse_wrong_azimuth(const WheelLayout& layout, const std::vector<WheelFinding>& findings);
 
 /// For every motor: where `findings` leave a question, the person answers it.
 void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFinding>* findings);
