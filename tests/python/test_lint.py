@@ -238,6 +238,13 @@ def test_house_wants_short_files(tmp_path):
     assert [f.path for f in house.short_files(tree)] == ["src/long.cpp"]
 
 
+def test_house_wants_few_templates_above_the_tick(tmp_path):
+    parts = {f"src__app__{i}_hpp": "template <class T>\n" for i in range(house.MOST_TEMPLATES)}
+    assert not house.plain_above_the_tick(planted(tmp_path, src__plant__a_hpp="template <int N>\n", **parts))
+    tree = planted(tmp_path, src__runtime__b_cpp="  template <class T>\n", **parts)
+    assert [f.path.split("/")[0] for f in house.plain_above_the_tick(tree)] == ["src"]
+
+
 def test_house_wants_a_small_tree_and_each_picture_once(tmp_path, monkeypatch):
     tree = planted(tmp_path, a_png="x" * 60, a_svg="x", b_svg="x" * 39)
     monkeypatch.setattr(house, "LARGEST_TREE", 100)

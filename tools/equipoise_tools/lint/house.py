@@ -18,6 +18,8 @@ FORBIDDEN = (
 )
 LONGEST_OPENING_COMMENT = 8
 LONGEST_FILE = 400
+PLAIN = ("src/app/", "src/runtime/", "src/config/")  # above the tick: functions and interfaces
+MOST_TEMPLATES = 9  # there: what wraps a robot's own types, and what visits fields of any type
 LARGEST_TREE = 8 * 2**20  # bytes: who clones it fetches its history, too
 _BINARY = (".png", ".gif", ".svg", ".lcm", ".log", ".bin", ".gz", ".ico", ".csv", ".parquet")
 
@@ -70,6 +72,17 @@ def short_files(tree: Tree) -> list[Finding]:
     return findings
 
 
+def plain_above_the_tick(tree: Tree) -> list[Finding]:
+    counts = {name: tree.text(name).count("template <") for name in tree.files if name.startswith(PLAIN)}
+    total = sum(counts.values())
+    if total <= MOST_TEMPLATES:
+        return []
+    most = max(counts, key=counts.__getitem__)
+    return [
+        Finding(most, 0, f"has {counts[most]} of {total} templates above the tick, limit {MOST_TEMPLATES}")
+    ]
+
+
 def small_tree(tree: Tree) -> list[Finding]:
     """Generated pages and pictures grow without anybody noticing; a picture is kept once."""
     findings = [
@@ -87,4 +100,7 @@ def small_tree(tree: Tree) -> list[Finding]:
 
 
 def house(tree: Tree) -> list[Finding]:
-    return forbidden_words(tree) + headers_open_with_a_comment(tree) + short_files(tree) + small_tree(tree)
+    checks = (
+        forbidden_words, headers_open_with_a_comment, short_files, plain_above_the_tick, small_tree,
+    )  # fmt: skip
+    return [finding for check in checks for finding in check(tree)]
