@@ -14,6 +14,7 @@ from typing import Any
 
 from .entry import leave
 from .paths import repository_root
+from .table import matlab
 
 MAPS = Path("config/real/maps")
 PAGE, DATA = Path("docs/reality.md"), Path("docs/reality.json")
@@ -53,6 +54,49 @@ def identified(table: Path, map_file: Path) -> dict[str, Any]:
     done = subprocess.run([*command, "--json"], stdout=subprocess.PIPE, check=True)
     result: dict[str, Any] = json.loads(done.stdout)
     return result
+
+
+def motors(root: Path, folder: Path, map_file: Path) -> dict[str, Any] | None:
+    """R and k of every motor log there, or why not, beside the published ones."""
+    described = tomllib.loads(map_file.read_text())
+    owner, name = described["source"]["repository"].split("/")
+    files = sorted(
+        f
+        for r in (f"{owner}+{name}", f"{owner}/{name}", name)
+        for f in folder.glob(f"{r}/{described['source']['path']}")
+    )
+    taken, refused = {}, {}
+    for file in files:
+        with tempfile.TemporaryDirectory() as temporary:
+            table = file
+            if file.suffix == ".mat":
+                table = Path(temporary) / "table.csv"
+                matlab(file).to_csv(table, index=False)
+            for motor in ("1", "2"):
+                command = [root / "build/host/equipoise", "identify", "motor", table, "--map", map_file]
+                command += ["--motor", motor, "--json", "-"]
+                done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
+                log = f"{file.name}, motor {motor}"
+                if done.returncode == 0:
+                    taken[log] = json.loads(done.stdout)["estimates"]
+                else:
+                    refused[log] = done.stderr.strip().split(f"{table}: ")[-1]
+    hashes = {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
+    published = described["published"]
+    return {"published": published, "taken": taken, "refused": refused, "sha256": hashes} if files else None
+
+
+def motor_rows(found: dict[str, Any]) -> list[str]:
+    rows = ["| log | R, ohm | k, N m/A | published |", "|---|---|---|---|"]
+    for content in found.values():
+        p = content["published"]
+        published = f"{p['resistance_ohm']:.3g}, {p['torque_constant_N_m_A']:.4g}"
+        for log, e in content["taken"].items():
+            cells = (e["resistance_ohm"], e["torque_constant_N_m_A"])
+            values = " | ".join(f"{c['value']:.4g} +- {c['half_width_95']:.2g}" for c in cells)
+            rows.append(f"| {log} | {values} | {published} |")
+        rows += [f"| {log} | refused: {why} | | {published} |" for log, why in content["refused"].items()]
+    return rows
 
 
 def shown(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
@@ -130,6 +174,14 @@ def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
             f"| {name} | [{source['repository']}](https://github.com/{source['repository']}) "
             f"{source['commit']} | {source['path']} | {source['licence']} | `{source['sha256'][:16]}` |"
         )
+    for name, content in data.get("motors", {}).items():
+        source = tomllib.loads((repository_root() / MAPS.parent / f"motors/{name}.toml").read_text())[
+            "source"
+        ]
+        link = f"[{source['repository']}](https://github.com/{source['repository']}) {source['commit']}"
+        for file, digest in content["sha256"].items():
+            path = Path(source["path"]).parent / file
+            origin.append(f"| {name} | {link} | {path} | {source['licence']} | `{digest[:16]}` |")
     return "\n".join(
         [
             f"Firmware {data['version']} (earlier: {data['before_version'] or '-'}); earlier -> now.\n",
@@ -140,6 +192,8 @@ def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
             *noise_rows,
             "\n`tools/lab identify`, SI, first half fitted; 0.1 s ahead in the rest: tilt, wheels, mrad.\n",
             *known_rows,
+            "\n`equipoise identify motor`, 95 % intervals.\n",
+            *motor_rows(data.get("motors", {})),
             "\n## Origin\n",
             *origin,
             "",
@@ -174,6 +228,10 @@ def main() -> int:
         else:
             known = identified(table, file)
             data.setdefault("identified", {})[file.stem] = known | {"log": table.name}
+    for file in sorted((root / MAPS).parent.glob("motors/*.toml")):
+        found_motors = motors(root, arguments.folder.resolve(), file)
+        if found_motors is not None:
+            data.setdefault("motors", {})[file.stem] = found_motors
     if not done and not data.get("identified"):
         print(f"{arguments.folder}: holds none of the logs of docs/reality.md", file=sys.stderr)
         return 1
