@@ -150,12 +150,12 @@ def robot_bodies(robot: str, d: dict[str, Any]) -> list[Body]:
 
 
 def possible(moments: Numbers) -> Numbers:
-    """The nearest that compilers take: no moment exceeds the sum of the others.
+    """The nearest that compilers take: no moment exceeds the sum of the others, as `numbers` rounds them.
 
     [T] Table 3.2's wheel does, as it carries its motor's rotor; `exact` has the numbers of the equations.
     """
     total = sum(moments)
-    return tuple(min(moment, (total - moment) * (1 - 1e-9)) for moment in moments)
+    return tuple(min(moment, (total - moment) * (1 - 1e-7)) for moment in moments)
 
 
 # --- MJCF ---
