@@ -245,10 +245,9 @@ def performance_page(root: Path) -> str:
         "Written by `./tools/count_instructions --write`: counted, not timed, so that the numbers do not "
         "depend on the load of the machine. x86-64 by callgrind; Cortex-A8 by a plugin of qemu-arm. An armed "
         "tick of the robot as built (world `built2025`) turning at 1 Hz; the dense filter is the same "
-        "model in `KalmanFilter`, fixed-size Eigen, in the same binary. The MBBR's detector runs a filter "
-        "per hypothesis all the time (sensor_faults.hpp), the eduMIP's while an encoder is under suspicion "
-        "(wheel_isolation.hpp): how many ran in a tick is counted, too, and each is a dense "
-        "one in the dense tick. tools/test fails when a count on x86 grows by more than "
+        "model in `KalmanFilter`, fixed-size Eigen, in the same binary. The detector runs a filter per "
+        "hypothesis all the time (sensor_faults.hpp): how many ran in a tick is counted, too, and each is a "
+        "dense one in the dense tick. tools/test fails when a count on x86 grows by more than "
         "3 %, tools/cross-test when one on the Cortex-A8 does.",
         "",
         *table(counts),
