@@ -267,7 +267,11 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
        scene.set = {"safety.max_stalled_ticks=5"};
        return mbbr(scene);
      }},
-    {kPickedUp, [] { return mip({{"world.nominal.lift_at_s=3.0"}}); }},
+    // Nothing judged: the detector may be first.
+    {kPickedUp,
+     [] {
+       return mip({{"world.nominal.lift_at_s=3.0", "safety.detection=false"}});
+     }},
     {kStall, [] { return held_fast(0.0); }},
     {kSaturated, [] { return held_fast(1.0); }},
     {kWheelSlip,

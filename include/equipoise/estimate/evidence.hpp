@@ -12,8 +12,9 @@
 namespace equipoise {
 
 struct EvidenceParams {
-  double encoder_sigma_rad = 0.0;  // counts and play
-  double wheel_step_rad = 0.0;     // that a wheel turns in a tick, at most
+  double encoder_sigma_rad = 0.0;            // counts and play
+  double wheel_step_rad = 0.0;               // that a wheel turns in a tick, at most
+  std::array<double, 3> gyro_sigma_rad_s{};  // of what turns the body beside the model, at least
 };
 
 template <class Filter, int Wheels>
@@ -49,11 +50,17 @@ class Evidence {
     double misfit = 0.0;
     return bounded(log_density(f, used, came, &misfit));
   }
-  /// What no filter explains is vibration; the median of the gyro's axes, for one may be faulty. `least`: of
-  /// the squared innovations of all filters.
-  void learn_vibration(const Filter& f, const Sample& used, const std::array<double, 3>& least) noexcept {
+  /// What comes and goes from sample to sample is vibration (von Neumann 1941); the median of the gyro's
+  /// axes, for one may be faulty.
+  void learn_vibration(const Filter& f, const Sample& used) noexcept {
+    std::array<double, 3> change{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      change[i] = f.row_innovation()[i] - innovation_[i];
+      innovation_[i] = f.row_innovation()[i];
+    }
     if (!(comes(used, 0) && comes(used, 1) && comes(used, 2))) return;
-    const auto [a, b, c] = least;
+    for (double& c : change) c *= 0.5 * c;
+    const auto [a, b, c] = change;
     const double median = std::max(std::min(a, b), std::min(std::max(a, b), c));
     const auto& expected = f.row_variance();
     const double floor = std::max(vibration_, *std::min_element(expected.begin(), expected.begin() + 3));
@@ -68,6 +75,8 @@ class Evidence {
     known_ = z.encoders_ok;
   }
 
+  /// Of the gyro, one sigma.
+  double vibration_rad_s() const noexcept { return std::sqrt(vibration_); }
   bool known() const noexcept { return known_; }
   const Sample& before() const noexcept { return before_; }
   /// Ticks since an encoder has counted.
@@ -76,6 +85,12 @@ class Evidence {
   /// Variance of an innovation: what the filter expects, at least what vibrates, and the model's error.
   double spread(const Filter& f, std::size_t row) const noexcept {
     return kModelError * kModelError * std::max(f.row_variance()[row], row < 3 ? vibration_ : 0.0);
+  }
+  /// What a jump of the row's sensor, of `variance`, would explain of this tick's innovation; nats.
+  double jump(const Filter& f, std::size_t row, double variance) const noexcept {
+    const double v = spread(f, row);
+    const double wide = log_normal(squared(f, row), v + variance);
+    return wide - std::max(log_normal(squared(f, row), v), faulty_[row] + std::log(kShaken));
   }
   static double squared(const Filter& f, std::size_t row) noexcept {
     return f.row_innovation()[row] * f.row_innovation()[row];
@@ -96,6 +111,7 @@ class Evidence {
  private:
   static constexpr double kModelError = 2.0;      // NIS of real logs reaches 4: docs/reality.md
   static constexpr double kShaken = 0.05;         // share of an IMU's samples beyond five sigma, real logs
+  static constexpr double kFelt = 0.5;            // of an accelerometer's, that feel what pushes the body
   static constexpr double kVibrationMean = 0.01;  // half a second
   static constexpr double kMedianOfThree = 0.6;   // of squared normal numbers
   static constexpr double kMostVibration_rad_s = 0.1;  // real robots that roll
@@ -104,6 +120,10 @@ class Evidence {
 
   bool repeats(std::size_t row, const Sample& z) const noexcept {
     return reading(z, row) == reading(before_, row);
+  }
+
+  static double log_normal(double squared, double variance) noexcept {
+    return -0.5 * (std::log(2.0 * kPi * variance) + squared / variance);
   }
 
   /// Of the rows that came; those that are not used, as a faulty sensor has them.
@@ -119,8 +139,8 @@ class Evidence {
       const double peak = -0.5 * std::log(2.0 * kPi * variance);
       double density = peak - 0.5 * squared(f, row) / variance;
       if (!(density > -1e6)) return -1e6;  // the filter has diverged
-      const bool imu = row < 3 || row >= kAccelRow;
-      if (imu) density = std::max(density, faulty_[row] + std::log(kShaken));
+      if (row < 3) density = std::max(density, faulty_[row] + std::log(kShaken));
+      if (row >= kAccelRow) density = std::max(density, faulty_[row] + std::log(kFelt));
       sum += density;
       *misfit += peak - density;
     }
@@ -142,6 +162,7 @@ class Evidence {
 
   EvidenceParams p_;
   double vibration_ = 0.0;              // variance of the gyro
+  std::array<double, 3> innovation_{};  // of the gyro, a tick ago
   double expected_ = 0.0;               // log density of what is expected
   std::array<double, kRows> faulty_{};  // log densities, of this tick
   Sample before_;                       // a tick ago

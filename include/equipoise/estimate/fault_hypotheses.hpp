@@ -27,6 +27,11 @@ struct FaultHypothesis {
     while (i < 31 && (mask >> i & 1U) == 0) ++i;
     return i;
   }
+  constexpr int last() const noexcept {
+    int i = 31;
+    while (i > 0 && (mask >> i & 1U) == 0) --i;
+    return i;
+  }
   constexpr bool healthy() const noexcept {
     return kind == kSpin || kind == kSlip || kind == kPush || kind == kNoise;
   }

@@ -1,6 +1,6 @@
-// Samples of an IMU that no motion explains: glitches are not used, a few in a row; an axis that repeats its
-// counts while the body turns is dead. In: Measurement, what the gyro should read -> out: what may be used.
-// RT-safe.
+// Samples of an IMU that no motion explains: a glitch is not used, nor, when it goes on, the gyro's axes that
+// are off; an axis that repeats its counts while the body turns is dead. In: Measurement, what the gyro
+// should read -> out: what may be used. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -31,10 +31,11 @@ class GrossSamples {
     bool frozen = false;
     double balance_rad_s = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
-      if (!balances_[i]) continue;
       const double away_rad_s = std::abs(away(static_cast<int>(i)));
+      z.gyro_axis_ok[i] = z.gyro_axis_ok[i] && away_rad_s < kGross_rad_s;
+      if (!balances_[i]) continue;
       balance_rad_s = std::max(balance_rad_s, away_rad_s);
-      frozen = frozen || (z.imu_ok && !z.gyro_axis_ok[i] && away_rad_s > kTurns_rad_s);
+      frozen = frozen || (z.imu_ok && !raw.gyro_axis_ok[i] && away_rad_s > kTurns_rad_s);
     }
     frozen_ = frozen ? frozen_ + 1 : 0;
     trusted_ = trusted_ && frozen_ <= kFrozenTicks && !(gross_ > kGlitch && balance_rad_s > kGross_rad_s);
@@ -42,7 +43,8 @@ class GrossSamples {
   }
 
   bool trusted() const noexcept { return trusted_; }
-  bool frozen() const noexcept { return frozen_ >= kFrozenTicks; }
+  /// An axis is not used, and for longer than a glitch.
+  bool left_out() const noexcept { return frozen_ >= kFrozenTicks || gross_ > kGlitch; }
 
  private:
   static constexpr double kGross_rad_s = 3.0;  // between two samples: 600 rad/s2

@@ -24,6 +24,7 @@ namespace equipoise {
 struct SensorFaultsParams {
   EvidenceParams evidence;
   std::array<bool, 3> balances{};  // gyro axes without which the robot falls
+  Vec3 axis_sign = Vec3::Ones();   // of the sensor's axis along each of the body's
 };
 
 template <class Filter, int Wheels>
@@ -44,6 +45,7 @@ class SensorFaults {
         healthy_(with_noise(filter, params)),
         before_(healthy_),
         members_(filled(healthy_, std::make_index_sequence<kCount>())) {
+    for (std::size_t i = 0; i < 3; ++i) quiet_[i] = filter.row_noise(i);
     Filter& shaken = members_[kCount - 1].filter;
     static_assert(kHypotheses[kCount - 1].kind == FaultHypothesis::kNoise);
     for (std::size_t i = 0; i < 3; ++i) shaken.set_row_noise(i, kNoise_rad_s * kNoise_rad_s);
@@ -59,7 +61,7 @@ class SensorFaults {
     gross_.reset();
     weigh_.reset(rest_sigma_rad_s);
     trusted_ = true;
-    ticks_ = jumps_ = 0;
+    ticks_ = jumps_ = event_at_ = 0;
     stale_ = true;
   }
 
@@ -67,6 +69,7 @@ class SensorFaults {
   void step(Filter& control, const Input& u, const Sample& raw, const Vec3& expected_rad_s) noexcept {
     ++ticks_;
     const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
+    hear_vibration(control, {});
     control.predict(u);
     control.update(used_.of(z));
     if (!raw.imu_ok || !raw.encoders_ok) {  // nothing to weigh against each other
@@ -84,7 +87,9 @@ class SensorFaults {
 
   bool trusted() const noexcept { return trusted_ && gross_.trusted(); }
   std::uint32_t excluded_wheels() const noexcept { return used_.without_wheels; }
-  bool gyro_axis_excluded() const noexcept { return used_.without_axes != 0 || gross_.frozen(); }
+  bool gyro_axis_excluded() const noexcept {
+    return (used_.without_axes | used_.swapped) != 0 || gross_.left_out();
+  }
   int bias_jumps() const noexcept { return jumps_; }
   /// A fault leads: what surprises the control's filter is about to be explained.
   bool suspects() const noexcept { return suspects_; }
@@ -128,6 +133,8 @@ class SensorFaults {
 
   static Filter with_noise(Filter filter, const SensorFaultsParams& p) {
     filter.let_encoders_slip(false);  // slipping is a hypothesis of its own
+    for (std::size_t i = 0; i < 3; ++i)
+      filter.set_row_noise(i, std::max(filter.row_noise(i), std::pow(p.evidence.gyro_sigma_rad_s[i], 2)));
     for (std::size_t i = Evidence::kWheelRow; i < Evidence::kAccelRow; ++i)
       filter.set_row_noise(i, p.evidence.encoder_sigma_rad * p.evidence.encoder_sigma_rad);
     return filter;
@@ -135,6 +142,14 @@ class SensorFaults {
   template <std::size_t... I>
   static std::array<Member, kCount> filled(const Filter& filter, std::index_sequence<I...>) {
     return {((void)I, Member{filter})...};
+  }
+
+  /// The gyro is as noisy as it has been lately.
+  void hear_vibration(Filter& filter, const std::array<double, 3>& least_rad_s) const noexcept {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double sigma = std::max(weigh_.vibration_rad_s(), least_rad_s[i]);
+      filter.set_row_noise(i, std::max(quiet_[i], sigma * sigma));
+    }
   }
 
   void begin_all() noexcept {
@@ -149,6 +164,7 @@ class SensorFaults {
     Member& m = members_[i];
     m.filter.adopt(from);
     m.used = used_.turned_over(h);
+    if (h.kind == FaultHypothesis::kSwap) m.used.swap_sign = p_.axis_sign(h.first()) * p_.axis_sign(h.last());
     const bool wheel_returns = h.kind == FaultHypothesis::kWheel && (used_.without_wheels & h.mask) != 0;
     if (wheel_returns && weigh_.known())
       m.used.offset_rad(h.first()) =
@@ -165,42 +181,37 @@ class SensorFaults {
 
   bool applies(const FaultHypothesis& h) const noexcept {
     if (h.kind == FaultHypothesis::kWheel) return (used_.backwards & h.mask) == 0;
-    if (h.kind == FaultHypothesis::kSwap) return (used_.without_axes & h.mask) == 0;
+    if (h.kind == FaultHypothesis::kSwap) return ((used_.without_axes | used_.swapped) & h.mask) == 0;
     const bool encoders = h.kind == FaultHypothesis::kReversed || h.kind == FaultHypothesis::kWheels;
     return !encoders || (used_.without_wheels & h.mask) == 0;
   }
 
   void advance_all(const Input& u, const Sample& z) noexcept {
     before_.adopt(healthy_);
+    hear_vibration(healthy_, p_.evidence.gyro_sigma_rad_s);
     healthy_.predict(u);
     const Sample used = used_.of(z);
     healthy_.update(used);
     const double as_used = weigh_.expect(healthy_, used, z);
-    std::array<double, 3> least;
-    for (std::size_t row = 0; row < 3; ++row) least[row] = Evidence::squared(healthy_, row);
     for (std::size_t i = 0; i < kCount; ++i) {
-      if (!applies(kHypotheses[i])) continue;
-      advance(i, u, z, as_used);
-      const Member& m = members_[i];
-      // What fits anything tells no vibration.
-      if (kHypotheses[i].kind == FaultHypothesis::kBias || m.used.swapped != 0) continue;
-      const Sample seen = m.used.of(z);
-      for (std::size_t row = 0; row < 3; ++row)
-        if (Evidence::comes(seen, row)) least[row] = std::min(least[row], Evidence::squared(m.filter, row));
+      if (applies(kHypotheses[i])) advance(i, u, z, as_used);
     }
-    weigh_.learn_vibration(healthy_, used, least);
+    weigh_.learn_vibration(healthy_, used);
   }
 
   void advance(std::size_t i, const Input& u, const Sample& z, double as_used) noexcept {
     const FaultHypothesis& h = kHypotheses[i];
     Member& m = members_[i];
     if (h.kind == FaultHypothesis::kBias) {
-      const double jump = jump_explains(z);
-      if (jump > 0.0 && jump >= m.ratio) return jumped(i, u, z, jump);
+      // What it follows already is no new jump, unless the axes that balance say so.
+      const double all = jump_explains(z, {true, true, true});
+      const bool anew = m.ratio <= -kMargin || jump_explains(z, p_.balances) > std::max(m.ratio, 0.0);
+      if (anew && all > -kMargin) return jumped(i, u, z, all);
       if (m.ratio <= -kMargin) return;
     } else if (m.ratio <= -kMargin || (h.healthy() && ticks_ - m.since > kEventTicks)) {
       begin(i, before_);
     }
+    if (h.kind != FaultHypothesis::kNoise) hear_vibration(m.filter, p_.evidence.gyro_sigma_rad_s);
     m.filter.predict(u);
     if (h.kind == FaultHypothesis::kPush) m.filter.allow_push(kPush_N);
     if (h.kind == FaultHypothesis::kSpin) m.filter.allow_spin(kSlip_rad);
@@ -210,7 +221,7 @@ class SensorFaults {
     double gain = weigh_(m.filter, used, z) - as_used;
     if (m.returns >= 0) gain = std::min(gain, unless_faulty(m, z));
     m.ratio = std::max(m.ratio + gain, -kMargin);
-    if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < kLeastJump_rad_s) m.ratio = -kMargin;
+    if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < least_jump_rad_s()) m.ratio = -kMargin;
   }
 
   /// Of the gyro's bias, on the axis that it has moved most. What is smaller the filter's own bias learns:
@@ -221,27 +232,28 @@ class SensorFaults {
     return d.cwiseAbs().maxCoeff();
   }
 
-  /// Had the gyro's bias jumped just now, what would that explain? (Willsky and Jones 1976)
-  double jump_explains(const Sample& z) const noexcept {
+  double least_jump_rad_s() const noexcept {
+    return std::max(kLeastJump_rad_s, 3.0 * weigh_.vibration_rad_s());
+  }
+
+  /// Had the gyro's bias jumped just now, what would that explain of `axes`? (Willsky and Jones 1976)
+  double jump_explains(const Sample& z, const std::array<bool, 3>& axes) const noexcept {
     double sum = 0.0;
     double most = 0.0;
     const Sample used = used_.of(z);
     for (std::size_t i = 0; i < 3; ++i) {
-      if (!p_.balances[i] || !Evidence::comes(used, i)) continue;
-      const double variance = weigh_.spread(healthy_, i);
-      sum += 0.5 * Evidence::squared(healthy_, i) *
-             (1.0 / variance - 1.0 / (variance + kJump_rad_s * kJump_rad_s));
-      most = std::max(most, std::abs(healthy_.row_innovation()[i]));
+      if (!axes[i] || !Evidence::comes(used, i)) continue;
+      sum += weigh_.jump(healthy_, i, kJump_rad_s * kJump_rad_s);
+      if (p_.balances[i]) most = std::max(most, std::abs(healthy_.row_innovation()[i]));
     }
-    return most > kLeastJump_rad_s ? std::min(sum, Evidence::kOutlier) : 0.0;
+    return most > least_jump_rad_s() ? std::min(sum, Evidence::kOutlier) : -kMargin;
   }
   void jumped(std::size_t i, const Input& u, const Sample& z, double ratio) noexcept {
     begin(i, before_);
     Member& m = members_[i];
     const Sample used = used_.of(z);
     for (std::size_t k = 0; k < 3; ++k) {
-      if (p_.balances[k] && Evidence::comes(used, k))
-        m.used.bias_rad_s(static_cast<int>(k)) += healthy_.row_innovation()[k];
+      if (Evidence::comes(used, k)) m.used.bias_rad_s(static_cast<int>(k)) += healthy_.row_innovation()[k];
     }
     m.filter.doubt_bias(kBias_rad_s);
     m.filter.predict(u);
@@ -265,11 +277,13 @@ class SensorFaults {
   int consequence(std::size_t i) const noexcept {
     const FaultHypothesis& h = kHypotheses[i];
     if (h.healthy()) return kNone;
-    const bool falls = h.kind == FaultHypothesis::kAxis && p_.balances[static_cast<std::size_t>(h.first())] &&
-                       (used_.without_axes & h.mask) == 0;
-    if (h.kind == FaultHypothesis::kImu || h.kind == FaultHypothesis::kSwap || falls) return kStop;
-    if (h.kind == FaultHypothesis::kReversed) return h.first();  // as kWheel
-    return static_cast<int>(i);
+    const bool gyro = h.kind == FaultHypothesis::kSwap ||
+                      (h.kind == FaultHypothesis::kAxis && (used_.without_axes & h.mask) == 0);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (gyro && p_.balances[axis] && (h.mask >> axis & 1U) != 0) return kStop;
+    }
+    if (h.kind == FaultHypothesis::kImu) return kStop;
+    return h.kind == FaultHypothesis::kReversed ? h.first() : static_cast<int>(i);  // as kWheel
   }
   /// Whatever is read wrongly could as well be left out.
   bool left_out_explains(const FaultHypothesis& wiring) const noexcept {
@@ -284,7 +298,8 @@ class SensorFaults {
     const FaultHypothesis& h = kHypotheses[i];
     if (!applies(h)) return -kMargin;
     if (h.wiring() && !members_[i].from_start && !left_out_explains(h)) return -kMargin;
-    return members_[i].ratio + (h.healthy() ? kEventPrior : h.wiring() ? -kEventPrior : 0.0);
+    if (h.wiring()) return members_[i].ratio - kEventPrior;
+    return members_[i].ratio + (h.healthy() && ticks_ - event_at_ > kEventTicks ? kEventPrior : 0.0);
   }
 
   void decide(Filter& control) noexcept {
@@ -329,6 +344,7 @@ class SensorFaults {
     for (Member& m : members_) m.ratio = std::max(m.ratio - ratio, -kMargin);
     begin(event, healthy_);
     undecided_ = 0;
+    event_at_ = ticks_;
   }
 
   void use(std::size_t hypothesis) noexcept {
@@ -355,13 +371,15 @@ class SensorFaults {
   Filter before_;   // a tick ago
   std::array<Member, kCount> members_;
   Used used_;
-  bool stale_ = true;  // members have missed a tick
+  std::array<double, 3> quiet_{};  // the gyro's variances
+  bool stale_ = true;              // members have missed a tick
   bool trusted_ = true;
   bool suspects_ = false;
   bool stood_still_ = false;  // the encoder that was excluded last
   int ticks_ = 0;             // since arming
   int excluded_at_ = 0;
   int jumps_ = 0;
+  int event_at_ = 0;  // tick
   int undecided_ = 0;
 };
 

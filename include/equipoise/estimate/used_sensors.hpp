@@ -17,6 +17,7 @@ struct UsedSensors {
   std::uint32_t backwards = 0;       // of these: wiring, they do not return
   std::uint32_t without_axes = 0;    // of the gyro
   std::uint32_t swapped = 0;         // two axes of it
+  double swap_sign = 1.0;            // -1: each reads the other backwards
   int reversed = -1;                 // a wheel that counts backwards
   double mirror_rad = 0.0;           // since it stood there
   bool imu = true;
@@ -28,9 +29,13 @@ struct UsedSensors {
     s.gyro_B_rad_s -= bias_rad_s;
     s.wheel_angle_rad += offset_rad;
     if (reversed >= 0) s.wheel_angle_rad(reversed) = 2.0 * mirror_rad - s.wheel_angle_rad(reversed);
-    if (swapped == 0b011) std::swap(s.gyro_B_rad_s.x(), s.gyro_B_rad_s.y());
-    if (swapped == 0b110) std::swap(s.gyro_B_rad_s.y(), s.gyro_B_rad_s.z());
-    if (swapped == 0b101) std::swap(s.gyro_B_rad_s.z(), s.gyro_B_rad_s.x());
+    for (int i = 0; i < 3; ++i) {
+      const int k = (i + 1) % 3;
+      if (swapped != (1U << i | 1U << k)) continue;
+      std::swap(s.gyro_B_rad_s(i), s.gyro_B_rad_s(k));
+      s.gyro_B_rad_s(i) *= swap_sign;
+      s.gyro_B_rad_s(k) *= swap_sign;
+    }
     for (std::size_t i = 0; i < 3; ++i)
       s.gyro_axis_ok[i] = z.gyro_axis_ok[i] && (without_axes >> i & 1U) == 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(Wheels); ++i)

@@ -21,6 +21,17 @@ struct Calibration {
   Vec3 accel_bias_B_m_s2 = Vec3::Zero();  // of the specific force, after the scale
 };
 
+/// Of the sensor's axis that lies along each of the body's, or nearest: 1, or -1 where it points backwards.
+inline Vec3 axis_sign(const Mat3& R_BS) noexcept {
+  Vec3 sign;
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Index nearest = 0;
+    R_BS.row(i).cwiseAbs().maxCoeff(&nearest);
+    sign(i) = R_BS(i, nearest) < 0.0 ? -1.0 : 1.0;
+  }
+  return sign;
+}
+
 /// Roll, pitch, yaw of R = Rz Ry Rx.
 inline Vec3 euler_angles(const Mat3& R_WB) noexcept {
   return {std::atan2(R_WB(2, 1), R_WB(2, 2)), std::asin(std::fmax(-1.0, std::fmin(1.0, -R_WB(2, 0)))),

@@ -198,6 +198,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
       },
       &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
+  c.estimators.gyro_axis_sign = axis_sign(c.calibration.R_BS);
   return {config::loaded(document), c};
 }
 

@@ -19,10 +19,12 @@ void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
 
 /// Encoders of 720 counts (0.0087 rad), and as much again of play between motor and wheel. A wheel without
 /// load turns as fast as the back-EMF lets it.
-SensorFaultsParams sensor_faults(const MbbrParameters& robot) {
+SensorFaultsParams sensor_faults(const MbbrEstimatorParams& params) {
+  const MbbrParameters& robot = params.robot;
   const double no_load_rad_s = robot.k1 / robot.k2_ball * robot.r / robot.r_w;
   SensorFaultsParams p;
   p.balances = {true, true, false};
+  p.axis_sign = params.gyro_axis_sign;
   p.evidence.encoder_sigma_rad = 0.012;
   p.evidence.wheel_step_rad = kTickS * no_load_rad_s;
   return p;
@@ -36,7 +38,7 @@ MbbrEstimators::MbbrEstimators(const Params& params)
     : params_(params),
       kinematics_(params.robot),
       ekf_(params.robot, params.ekf),
-      faults_(ekf_, sensor_faults(params.robot)),
+      faults_(ekf_, sensor_faults(params)),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()
@@ -99,8 +101,8 @@ EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
   h.gyro_bias_known = rest_bias_.known();
   if (!params_.detection) return h;
   report(faults_, &h);
-  // Another fault may explain what the filter has made of it: a bias.
-  h.bias_drift_rad_s = faults_.suspects() ? 0.0 : bias_drift_.distance();
+  if (faults_.suspects()) return h;  // a fault may explain what the filter has made of it: a bias, a torque
+  h.bias_drift_rad_s = bias_drift_.distance();
   h.disturbance = ekf_.x().segment<3>(MbbrEkfModel::kDisturbance).norm();
   return h;
 }

@@ -26,8 +26,9 @@ inline constexpr std::array<const char*, 5> kMbbrEstimatorNames{"ekf", "ekf13_pu
 
 struct MbbrEstimatorParams {
   MbbrEstimatorId active = MbbrEstimatorId::kEkf;
-  bool compare = false;   // run all of them, not only the active one
-  bool detection = true;  // false: every sensor is used as it comes
+  bool compare = false;                // run all of them, not only the active one
+  bool detection = true;               // false: every sensor is used as it comes
+  Vec3 gyro_axis_sign = Vec3::Ones();  // of the sensor's axis along each of the body's
   MbbrEkf::Params ekf;
   KalmanFilter<MbbrPublishedModel>::Params ekf13_published;
   KalmanFilter<MbbrModel13>::Params ekf13;

@@ -174,6 +174,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
       },
       &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;
+  c.estimators.gyro_axis_sign = axis_sign(c.calibration.R_BS);
   return {config::loaded(document), c};
 }
 

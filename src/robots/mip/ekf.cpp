@@ -175,7 +175,29 @@ MipEkf::MipEkf(const MipParameters& robot, const Params& params)
       filter_(Model(robot, params.options, params.disturbance_time_constant_s), params.filter,
               params.precision),
       time_(params.sensor_age_s) {
+  // Gravity turns the body by its weight, the motors turn body and wheels against each other. A force at the
+  // centre of mass does work on both: it moves by r (theta + phi) + l theta.
+  const Model model(robot, params.options, params.disturbance_time_constant_s);
+  const auto rates = [&model](const Model::Motion& x, const Vec2& u) {
+    Model::Motion x_dot;
+    Mat<6, 6> A;
+    model.derivative(x, u, x_dot, A);
+    return Vec2(x_dot(Model::kThetaDot), x_dot(Model::kPhiDot));
+  };
+  constexpr double kLeant_rad = 1e-6;
+  const Model::Motion upright = Model::Motion::Zero();
+  const Vec2 on_body = rates(kLeant_rad * Model::Motion::Unit(Model::kTheta), Vec2::Zero()) /
+                       (kLeant_rad * robot.m_b * kGravity_m_s2 * robot.l);
+  const Vec2 on_wheels = rates(upright, Vec2::UnitX()) / (2.0 * robot.k1);
+  per_push_ = kTickS * ((robot.r + robot.l) * on_body + robot.r * on_wheels);
   start(0.0, Vec3::Zero(), Vec2::Zero());
+}
+
+void MipEkf::allow_push(double sigma_N) noexcept {
+  const Vec2 sigma = sigma_N * per_push_;
+  filter_.widen(Model::kThetaDot, 1, sigma.x() * sigma.x());
+  filter_.widen(Model::kPhiDot, 1, sigma.y() * sigma.y());
+  filter_.correlate(Model::kThetaDot, Model::kPhiDot, sigma.x() * sigma.y());
 }
 
 void MipEkf::start(double lean, const Vec3& gyro_bias_B_rad_s, const Vec2& wheel_angle_rad) noexcept {
@@ -187,6 +209,7 @@ void MipEkf::start(double lean, const Vec3& gyro_bias_B_rad_s, const Vec2& wheel
   gyro_bias_yz_ = gyro_bias_B_rad_s.tail<2>();
   heading_ = x(Model::kPsi);
   without_y_ = 0;
+  pushed_ = false;
   settling_ = kSettling;
 }
 
@@ -207,7 +230,7 @@ void MipEkf::predict(const Vec2& u) noexcept {
   time_.advance(u);
   const double before = x()(Model::kPsiDot);
   settling_ = std::max(settling_ - 1, 0);
-  const bool pushed = settling_ == 0 && filter_.row_nis()[Model::kAccelY] > kPushNis;
+  const bool pushed = settling_ == 0 && pushed_;
   filter_.predict(time_.acted());
   if (pushed) {
     filter_.widen(Model::kThetaDot, 1, kPushTiltRateVariance);
@@ -223,16 +246,13 @@ void MipEkf::adopt(const MipEkf& other) noexcept {
   heading_ = other.heading_;
   settling_ = other.settling_;
   without_y_ = other.without_y_;
-}
-
-/// The gyro's y is not used for a while after it was odd.
-void MipEkf::judge_y() noexcept {
-  without_y_ = filter_.row_nis()[Model::kGyro + 1] > kOddNis ? kWithoutTicks : std::max(without_y_ - 1, 0);
+  pushed_ = other.pushed_;
 }
 
 void MipEkf::miss(const Mip::Sample& z) noexcept {
   time_.observe(z.wheel_angle_rad, {});
-  judge_y();
+  without_y_ = std::max(without_y_ - 1, 0);
+  pushed_ = false;
   filter_.miss();
 }
 
@@ -247,10 +267,18 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
   y(Model::kAccelY) = z.accel_B_m_s2.y();
   const auto& axis = z.gyro_axis_ok;
   const bool imu = z.imu_ok;
-  judge_y();
-  const std::array<bool, 6> use{
+  without_y_ = std::max(without_y_ - 1, 0);
+  std::array<bool, 6> use{
       imu && axis[0], imu && axis[1] && without_y_ == 0, imu && axis[2], wheel[0], wheel[1], imu};
   filter_.innovate(time_.acted(), y, use);
+  const bool odd = filter_.row_nis()[Model::kGyro + 1] > kOddNis;
+  pushed_ = filter_.row_nis()[Model::kAccelY] > kPushNis;
+  if (odd || pushed_) {
+    if (odd) without_y_ = kWithoutTicks;
+    use[Model::kGyro + 1] = use[Model::kGyro + 1] && !odd;
+    use[Model::kAccelY] = use[Model::kAccelY] && !pushed_;
+    filter_.innovate(time_.acted(), y, use);
+  }
   const auto counts = [this](const Vec2& wheels) {
     return Vec2(kinematics_.phi(wheels), kinematics_.psi(wheels));
   };
@@ -260,6 +288,10 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
 
 Vec2 MipEkf::wheel_rate_rad_s() const noexcept {
   return kinematics_.wheels(x()(Model::kPhiDot), (1.0 + x()(Model::kWheelScale)) * x()(Model::kPsiDot));
+}
+
+Vec2 MipEkf::wheel_angle_rad() const noexcept {
+  return kinematics_.wheels(x()(Model::kPhi), x()(Model::kPsi)) + time_.age_s() * wheel_rate_rad_s();
 }
 
 MipEstimate MipEkf::estimate() const noexcept {

@@ -109,7 +109,17 @@ class MipEkf {
   /// Now, that is `sensor_age_s` after the filter's own state; without a position.
   MipEstimate estimate() const noexcept;
   Vec2 wheel_rate_rad_s() const noexcept;
+  Vec2 wheel_angle_rad() const noexcept;
 
+  /// A force at the body's centre of mass acted in the predicted tick.
+  void allow_push(double sigma_N) noexcept;
+  /// The robot has turned on the floor in it, otherwise than its wheels say.
+  void allow_spin(double sigma_rad) noexcept { filter_.widen(Model::kPsi, 1, sigma_rad * sigma_rad); }
+  /// Wheels have slipped on the floor in it.
+  void allow_slip(double sigma_rad) noexcept { filter_.widen(Model::kPhi, 2, sigma_rad * sigma_rad); }
+
+  static constexpr int kBiases = 1;  // of the gyro, that it estimates
+  double gyro_bias(int axis) const noexcept { return filter_.x()(Model::kGyroBias + axis); }
   /// A wheel's encoder may turn alone: encoder_slip.hpp. Its faults then leave no trace but innovations.
   void let_encoders_slip(bool slip) noexcept { encoders_slip_ = slip; }
   /// The gyro's bias is known to so much less.
@@ -128,15 +138,16 @@ class MipEkf {
   double tilt_sigma_rad() const noexcept { return std::sqrt(filter_.variance(Model::kTheta)); }
 
  private:
-  void judge_y() noexcept;
   void miss(const Mip::Sample& z) noexcept;
 
   MipKinematics kinematics_;
   Filter filter_;
+  Vec2 per_push_;  // change of tilt and wheel rate in a tick, per N
   TimeBase<2, 2> time_;
   bool encoders_slip_ = false;
   Vec2 gyro_bias_yz_ = Vec2::Zero();
   double heading_ = 0.0;
+  bool pushed_ = false;
   int settling_ = 0;   // ticks left until a push is told
   int without_y_ = 0;  // ticks left in which the gyro's y is not heard
 };

@@ -1,38 +1,21 @@
 #include "robots/mip/estimators.hpp"
 
-#include <Eigen/LU>
-
 namespace equipoise {
 namespace {
 
-/// Torque between body and wheels turns both: what it does to the body's rates per wheel rate.
-GyroWatchParams<2> gyro_watch(const MipEstimatorParams& params) {
-  const MipEkfModel model(params.robot, params.ekf.options, params.ekf.disturbance_time_constant_s);
-  const MipKinematics kinematics(params.robot);
-  const auto B = model.input_matrix();
-  Mat<2, 2> wheels;
-  Mat<3, 2> body = Mat<3, 2>::Zero();
-  for (int i = 0; i < 2; ++i) {
-    wheels.col(i) = kinematics.wheels(B(MipEkfModel::kPhiDot, i), B(MipEkfModel::kPsiDot, i));
-    body(0, i) = B(MipEkfModel::kThetaDot, i);
-    body(2, i) = B(MipEkfModel::kPsiDot, i);
-  }
-  GyroWatchParams<2> p;
-  p.from_wheels = body * wheels.inverse();
-  p.by_torque = body;
-  p.sigma_rad_s = {0.12, 0.03, 0.15};  // gravity, play: measured on robots 1 to 8
-  p.max_step_rad_s =
-      Vec3::Constant(2.0) + 3.0 * body.cwiseAbs().rowwise().sum();  // a push, full torque for 3 ticks
-  p.per_jump = {6.5, 0.0, 0.0};                                     // 0.15 rad/s; more than sound robots show
-  p.of_an_encoder = 0.2;  // one that counts backwards in a turn looks much like axes z and x swapped
+constexpr double kFoundAnew_rad_s = 0.15;  // of a bias that has jumped: what one noisy sample leaves open
+
+/// Play in the gears, by far more than the encoders' counts (0.003 rad). A wheel without load turns as fast
+/// as the back-EMF lets it.
+SensorFaultsParams sensor_faults(const MipEstimatorParams& params) {
+  SensorFaultsParams p;
   p.balances = {true, false, false};
-  p.by_rate = {false, true, true};  // y sees the yaw of a leaning robot, tyres do not slip
-  p.rate_sigma_rad_s = {0.0, 0.06, 0.25};
-  for (int i = 0; i < 2; ++i) p.yaw_from_wheels(i) = kinematics.psi(Vec2(Vec2::Unit(i)));
+  p.axis_sign = params.gyro_axis_sign;
+  p.evidence.encoder_sigma_rad = 0.012;
+  p.evidence.wheel_step_rad = kTickS * params.robot.k1 / params.robot.k2;
+  p.evidence.gyro_sigma_rad_s[1] = 0.1;  // tiles: a wheel climbs 0.7 mm in 0.1 s
   return p;
 }
-
-constexpr double kPlay_rad = 0.03;  // yaw by one wheel: the population has up to 0.04 rad of play in a gear
 
 }  // namespace
 
@@ -42,11 +25,9 @@ MipEstimators::MipEstimators(const Params& params)
       complementary_kf_(MipInclinometerModel{}, params.complementary_kf),
       planar_kf_(MipPlanarModel(params.robot), params.planar_kf),
       ekf_(params.robot, params.ekf),
-      isolation_(ekf_, kPlay_rad),
-      gyro_watch_(gyro_watch(params)),
-      dead_encoders_(Vec2(kinematics_.psi(Vec2::UnitX()), kinematics_.psi(Vec2::UnitY()))),
+      faults_(ekf_, sensor_faults(params)),
       ekf_published_(MipPublishedModel{}, params.ekf_published) {
-  ekf_.let_encoders_slip(!params.detection);  // else the detectors judge what an encoder does to the filter
+  ekf_.let_encoders_slip(!params.detection);  // else the detector judges what an encoder does to the filter
 }
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {
@@ -59,9 +40,7 @@ void MipEstimators::start(const Mip::Sample& z) noexcept {
   complementary_kf_.reset({lean, 0.0});
   planar_kf_.reset({lean, phi, 0.0, 0.0});
   ekf_.start(lean, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
-  isolation_.reset();
-  gyro_watch_.reset();
-  dead_encoders_.reset();
+  faults_.reset(ekf_, rest_bias_.noise_rad_s().norm() / std::sqrt(3.0));
   bias_drift_.reset(ekf_.x().segment<1>(MipEkfModel::kGyroBias));
   Vec<6> x6 = Vec<6>::Zero();
   x6.head<3>() << lean, phi, heading_;
@@ -154,28 +133,10 @@ void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
     move(Id::kEkf);
     return;
   }
-  Mip::Sample believed = z;
-  const Vec3 expected_rad_s = body_rates(x);
-  const int jumps = gyro_watch_.bias_jumps();
-  gyro_watch_.screen(believed, expected_rad_s, u);
-  if (gyro_watch_.bias_jumps() != jumps) {
-    ekf_.doubt_bias(BiasJump::kDoubt_rad_s);
-    bias_drift_.excuse(BiasJump::kFoundAnew_rad_s);
-  }
-  // Without slip the wheels turn the body as the gyro says, with the radii that the filter has learnt: 1.5 %
-  // of 1 Hz would fill the memory of what has slipped as far as play does.
-  const double scale = believable_scale(ekf_.x()(MipEkfModel::kWheelScale));
-  isolation_.step(ekf_, u, believed, [&](const Vec2& wheel_rates) {
-    return kinematics_.psi(wheel_rates) / scale - believed.gyro_B_rad_s.z();
-  });
+  const int jumps = faults_.bias_jumps();
+  faults_.step(ekf_, u, z, body_rates(x));
+  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(kFoundAnew_rad_s);
   bias_drift_.update(ekf_.x().segment<1>(MipEkfModel::kGyroBias), 0.0, 0.0);
-  dead_encoders_.update(believed, isolation_.lost());
-  GyroWitness<Mip::kWheels> witness;
-  witness.blamed_wheel = isolation_.lost();
-  witness.wheel_stands = isolation_.stands_still();
-  witness.accel_nis = ekf_.row_nis()[MipEkfModel::kAccelY];
-  witness.rate_rad_s.y() = expected_rad_s.y();
-  gyro_watch_.compare(believed, witness);
   const Vec2 position = x.position_W_m;
   x = ekf_.estimate();
   x.position_W_m = position;
@@ -221,13 +182,10 @@ EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
   h.predicts_wheels = true;
   h.gyro_bias_known = rest_bias_.known();
   if (!params_.detection) return h;
-  report(isolation_, &h);
-  h.dead = dead_encoders_.dead();
-  h.bias_drift_rad_s = isolation_.suspects() ? 0.0 : bias_drift_.distance();
+  report(faults_, &h);
+  if (faults_.suspects()) return h;  // a fault may explain what the filter has made of it: a bias, a torque
+  h.bias_drift_rad_s = bias_drift_.distance();
   h.disturbance = ekf_.x().segment<2>(MipEkfModel::kDisturbance).norm();
-  h.gyro_left_out = gyro_watch_.left_out();
-  h.gyro_bias_jumped = gyro_watch_.bias_jumped();
-  h.gyro_trusted = gyro_watch_.trusted();
   return h;
 }
 

@@ -7,14 +7,12 @@
 
 #include <array>
 
-#include "equipoise/estimate/dead_encoders.hpp"
-#include "equipoise/estimate/gyro_watch.hpp"
 #include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/kalman.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
+#include "equipoise/estimate/sensor_faults.hpp"
 #include "equipoise/estimate/slow_drift.hpp"
-#include "equipoise/estimate/wheel_isolation.hpp"
 #include "robots/mip/ekf.hpp"
 #include "robots/mip/mip.hpp"
 #include "robots/mip/models.hpp"
@@ -38,6 +36,7 @@ struct MipEstimatorParams {
   MipEstimatorId active = MipEstimatorId::kEkf;
   bool compare = false;                  // run all of them, not only the active one
   bool detection = true;                 // false: every sensor is used as it comes
+  Vec3 gyro_axis_sign = Vec3::Ones();    // of the sensor's axis along each of the body's
   double complementary_weight = 0.98;    // of the gyro, (3.29)
   double heading_time_constant_s = 0.5;  // gyro above, encoders below
   KalmanFilter<MipInclinometerModel>::Params complementary_kf;
@@ -72,10 +71,10 @@ class MipEstimators {
   const MipEkf& ekf() const noexcept { return ekf_; }
   /// Of the active estimator; only the default filter tells.
   EstimatorHealth<Mip::kWheels> health() const noexcept;
-  /// It finds a lying encoder by itself.
+  /// It finds a faulty encoder by itself.
   bool isolates() const noexcept { return params_.active == Id::kEkf; }
-  /// Default filters that run: one, and the bank that looks for a lying encoder; see wheel_isolation.hpp.
-  int filters() const noexcept { return isolation_.filters(); }
+  /// Default filters that run: the control's, and those that look for faults; see sensor_faults.hpp.
+  int filters() const noexcept { return params_.detection ? static_cast<int>(faults_.kCount) + 2 : 1; }
   bool reads_attitude() const noexcept { return runs(Id::kAttitude); }
 
  private:
@@ -95,9 +94,7 @@ class MipEstimators {
   KalmanFilter<MipInclinometerModel> complementary_kf_;
   KalmanFilter<MipPlanarModel> planar_kf_;
   MipEkf ekf_;
-  WheelIsolation<MipEkf, Mip::kWheels> isolation_;
-  GyroWatch<Mip::kWheels> gyro_watch_;
-  DeadEncoders<Mip::kWheels> dead_encoders_;
+  SensorFaults<MipEkf, Mip::kWheels> faults_;
   SlowDrift<1> bias_drift_;
   KalmanFilter<MipPublishedModel> ekf_published_;
   RestTilt rest_tilt_;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "robots/mip/config.hpp"
 #include "robots/mip/ekf.hpp"
@@ -109,6 +110,27 @@ TEST(MipEkf, FindsACrookedMountWhileTurning) {
   EXPECT_LT((filter.x().segment<2>(M::kMountX) - mount.head<2>()).norm(), 0.003);
   EXPECT_NEAR(filter.estimate().theta, 0.0, 0.003);
   EXPECT_NEAR(filter.estimate().psi_dot, 8.0, 0.01);
+}
+
+/// Of axle and body by hand: both move with the axle, the body leans about it.
+TEST(MipEkf, APushAtTheCentreOfMassMovesBodyAndWheelsTogether) {
+  const MipParameters p;
+  MipEkf::Params params;
+  params.filter.initial_variance.setConstant(1e-8);
+  MipEkf ekf(p, params);
+  const auto before = ekf.P();
+  ekf.allow_push(2.0);
+  const auto added = Mat<14, 14>(ekf.P() - before);
+  Mat<2, 2> inertia;
+  inertia << p.m_b + 2.0 * (p.m_w + p.I_w1 / (p.r * p.r)), p.m_b * p.l, p.m_b * p.l,
+      p.I_b1 + p.m_b * p.l * p.l;
+  const Vec2 rates = inertia.inverse() * (2.0 * kTickS * Vec2(1.0, p.l));
+  const double lean = rates.y();
+  const double wheel = rates.x() / p.r - lean;
+  EXPECT_NEAR(added(MipEkfModel::kThetaDot, MipEkfModel::kThetaDot), lean * lean, 1e-3 * lean * lean);
+  EXPECT_NEAR(added(MipEkfModel::kPhiDot, MipEkfModel::kPhiDot), wheel * wheel, 1e-3 * wheel * wheel);
+  EXPECT_NEAR(added(MipEkfModel::kThetaDot, MipEkfModel::kPhiDot), lean * wheel,
+              1e-3 * std::abs(lean * wheel));
 }
 
 TEST(MipEkf, FindsATrackUnlikeTheConfiguredOne) {

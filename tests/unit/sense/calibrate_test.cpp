@@ -33,6 +33,14 @@ TEST(Calibrate, CountsBecomeSiUnitsInBodyAxes) {
   EXPECT_NEAR(z.battery_V, 1700.0 * 1.8 / 4095.0 * 11.0 - 0.10, 1e-9);
 }
 
+TEST(Calibrate, TellsWhichAxesPointBackwards) {
+  Mat3 upright;  // the eduMIP's board
+  upright << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  EXPECT_EQ(axis_sign(upright), Vec3(1.0, -1.0, 1.0));
+  const Mat3 turned = Eigen::AngleAxisd(2.8, Vec3::UnitZ()).toRotationMatrix();
+  EXPECT_EQ(axis_sign(turned), Vec3(-1.0, -1.0, 1.0));
+}
+
 TEST(Calibrate, AttitudeQuaternionBecomesRollPitchYawOfTheBody) {
   const double half = 0.15;
   RawSample raw{};

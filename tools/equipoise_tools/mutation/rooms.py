@@ -65,10 +65,7 @@ COMMANDS = (
     ),
 )
 
-ESTIMATORS = (
-    *("bias_jump", "dead_encoders", "gyro_watch", "heun", "kalman"),
-    *("rest_bias", "sensor_faults", "slow_drift", "time_base", "wheel_isolation"),
-)
+ESTIMATORS = (*("heun", "kalman", "rest_bias", "sensor_faults", "slow_drift", "time_base"),)
 # Where the filters of the robots are instantiated, once for all who use them.
 FILTERS = ("src/robots/mbbr/ekf.cpp", "src/robots/mip/ekf.cpp")
 CONTROL_TESTS = {
