@@ -76,9 +76,9 @@ def simulated(root, binary, folder, robot, yaw, seed):
 
 @pytest.mark.parametrize(("robot", "yaw"), [(r, w) for r, all_w in YAW_RAD_S.items() for w in all_w])
 def test_not_worse_than_vqf_while_balancing(root, binary, tmp_path, robot, yaw):
-    """Over four robots."""
+    """Over twelve robots: of four on a floor that shakes either filter may be ahead by chance."""
     squares = []
-    for seed in range(1, 5):
+    for seed in range(1, 13):
         gyro, force, true_up = simulated(root, binary, tmp_path, robot, yaw, seed)
         mine = ours(binary, tmp_path, gyro, force, ROBOTS[robot][2])
         squares.append([inclination_rmse(up, true_up) ** 2 for up in (mine, theirs(gyro, force))])

@@ -211,8 +211,8 @@ ROOMS: dict[str, Room] = {
             ),
             Stage(
                 "tests/unit_tests",
-                ("unit/estimate/gyro_parts_test.cpp",),
-                only=tuple(f"*/gyro_{name}.hpp" for name in ("history", "lie", "noise", "watch")),
+                ("unit/estimate/sensor_faults_test.cpp",),
+                only=tuple(f"*/{name}.hpp" for name in ("evidence", "gross_samples", "used_sensors")),
             ),
             Stage(
                 "tests/unit_tests",
