@@ -48,7 +48,9 @@ def _five(theta: np.ndarray, phi_dot: np.ndarray) -> np.ndarray:
     return np.concatenate([theta[:, :2], phi_dot, theta[:, 2:]], axis=1)
 
 
-def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, seed: int, **more) -> Flight:
+def fly(
+    robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, seed: int, settings=None, **more
+) -> Flight:
     """The default filter flies, in double precision as those beside it; the function only listens."""
     heard: list[tuple] = []
     sound: list[bool] = []
@@ -68,7 +70,7 @@ def fly(robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, s
         robot_number=robot_number,
         estimator=listen,
         record=True,
-        set={"estimator.ekf.precision": "double"},
+        set={"estimator.ekf.precision": "double", **(settings or {})},
         **more,
     )
     if not all(sound) or run.degraded:
