@@ -13,16 +13,21 @@ from started_cockpit import PATIENCE_S
 
 
 class Robot:
-    """A simulated robot that takes commands; `stderr` as Popen takes it."""
+    """A simulated robot that takes commands; `stderr` as Popen takes it. SIGHUP as a terminal leaves it: what
+    runs these tests may ignore it (nohup)."""
 
-    def __init__(self, root, folder, stderr=subprocess.DEVNULL):
+    def __init__(self, root, folder, stderr=subprocess.DEVNULL, hangup=signal.SIG_DFL):
         self.binary, self.url, self.key = root / "build/host/equipoise", private_url(), folder / "robot.key"
         self.json = folder / "run.json"
         subprocess.run([self.binary, "keygen", self.key], check=True, stdout=subprocess.DEVNULL)
         command = [self.binary, "run", "--config", root / "config/edumip.toml", "--backend", "sim"]
         command += ["--fidelity", "nominal", "--telemetry", "off", "--log", "off", "--json", self.json]
         command += ["--command-url", self.url, "--command-key", self.key]
-        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=stderr)
+        before = signal.signal(signal.SIGHUP, hangup)
+        try:
+            self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=stderr)
+        finally:
+            signal.signal(signal.SIGHUP, before)
 
     def send(self, *arguments):
         return [self.binary, "send", "--key", self.key, "--url", self.url, *map(str, arguments)]
@@ -102,6 +107,18 @@ def test_a_robot_whose_stderr_nobody_reads_hears_a_disarm_and_ends(root, tmp_pat
         robot.process.wait()
         os.close(reading)
         os.close(writing)
+
+
+def test_under_nohup_a_robot_goes_on_when_its_terminal_closes(root, tmp_path, multicast):
+    robot = Robot(root, tmp_path, hangup=signal.SIG_IGN)
+    try:
+        assert robot.told("--timeout-s", PATIENCE_S, "--arm").stdout == "armed\n"
+        robot.process.send_signal(signal.SIGHUP)
+        assert robot.told("--timeout-s", PATIENCE_S, "--disarm").stdout == "disarmed\n"
+        assert robot.end()["ended"] == "interrupted"
+    finally:
+        robot.process.kill()
+        robot.process.wait()
 
 
 def test_a_terminal_that_is_stopped_does_not_hold_up_a_disarm(root, tmp_path, multicast):
