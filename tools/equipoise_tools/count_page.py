@@ -8,6 +8,7 @@ from pathlib import Path
 ROBOTS = {"mbbr": "config/mbbr.toml", "mip": "config/edumip.toml"}
 TICK_HZ = 200
 CLOCK_HZ = 1e9
+LONGEST_TICK_S = 2e-3  # at CLOCK_HZ, in every mode: the guard waits for three silent ticks
 TABLE = Path("tests/data/instructions.json")
 PRECISION = Path("tests/data/precision.json")  # of equipoise_tools.precision
 PAGE = Path("docs/performance.md")
@@ -103,6 +104,14 @@ def cycle_tables(robots: dict) -> list[str]:
             row(label, lambda r, mode=mode: f"{r['modes'][mode]['mean']:,}, {r['modes'][mode]['most']:,}")
             for mode, label in MODES.items()
         ),
+        "",
+        f"No tick of any mode may take more than {LONGEST_TICK_S * 1e3:g} ms at 1 GHz, also one that catches "
+        "up: tests/python/test_count_instructions.py. Longest of all: "
+        + ", ".join(
+            f"{max(m['most'] for m in robots[r]['modes'].values()) / CLOCK_HZ * 1e3:.2f} ms ({r})"
+            for r in ROBOTS
+        )
+        + ".",
     ]
 
 
