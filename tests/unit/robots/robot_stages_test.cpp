@@ -4,7 +4,9 @@
 #include <complex>
 
 #include "equipoise/control/friction.hpp"
+#include "robots/mbbr/config.hpp"
 #include "robots/mbbr/scheduled_feedback.hpp"
+#include "robots/mip/config.hpp"
 #include "robots/mip/lqr_feedback.hpp"
 
 namespace equipoise {
@@ -49,6 +51,26 @@ TYPED_TEST(RobotStages, TruthHasNoError) {
   EXPECT_EQ(e.speed_squared, 0.0);
   EXPECT_GE(e.axes, 1);
   EXPECT_TRUE(v.theta_rad.isZero(0.0));
+}
+
+auto reference_of(const Mbbr&, const Overrides& set) {
+  return load_mbbr(std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml", set).config.reference;
+}
+auto reference_of(const Mip&, const Overrides& set) {
+  return load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", set).config.reference;
+}
+
+TYPED_TEST(RobotStages, JerkAndAccelerationAreThoseThatTheRobotCanFollow) {
+  const auto limits = [](const Overrides& set) { return reference_of(TypeParam{}, set); };
+  const auto of_the_robot = limits({"reference.max_jerk_m_s3=1e9"});
+  const double falls_1_s = of_the_robot.max_jerk_m_s3 / of_the_robot.feasible_acceleration_m_s2;
+  EXPECT_GT(falls_1_s, 2.0);
+  EXPECT_LT(falls_1_s, 15.0);
+  const std::string half = std::to_string(0.5 * this->parameters.k1);
+  const auto weak = limits({"reference.max_jerk_m_s3=1e9", "robot.k1_N_m=" + half});
+  EXPECT_NEAR(weak.feasible_acceleration_m_s2, 0.5 * of_the_robot.feasible_acceleration_m_s2, 1e-3);
+  EXPECT_NEAR(weak.max_jerk_m_s3, 0.5 * of_the_robot.max_jerk_m_s3, 1e-2);
+  EXPECT_EQ(limits({"reference.max_jerk_m_s3=0.05"}).max_jerk_m_s3, 0.05) << "who asks for less gets less";
 }
 
 TEST(MipReference, ARobotThatIsHeldDoesNotStoreUpALeap) {
