@@ -31,7 +31,7 @@ class Ahead<World, std::void_t<typename World::Rolling>> : public World {
     rolled_ = true;
     return &numbers_;
   }
-  void advance(const MotorCommand& command) {
+  void advance(const MotorCommand& command) override {
     if (std::exchange(rolled_, false)) {
       World::end_rolling(numbers_);
     } else {

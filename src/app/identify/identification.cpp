@@ -147,7 +147,7 @@ std::string why_not(const BenchLog& log, const Electrical& rows, const LeastSqua
         "voltage, current and speed are not related as V = R i + k omega (R2 %.3f): the driver or the sensor "
         "is off, or a unit, a sign or a column is wrong",
         fit.r_squared);
-  const std::string coasting = coasts(rows, fit);
+  std::string coasting = coasts(rows, fit);
   if (!coasting.empty()) return coasting;
   const Electrical fine_rows = electrical_windows(log, kFine_s, true);
   const LeastSquares fine = least_squares(fine_rows.A, fine_rows.voltage);
