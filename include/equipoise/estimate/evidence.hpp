@@ -86,11 +86,17 @@ class Evidence {
   double spread(const Filter& f, std::size_t row) const noexcept {
     return kModelError * kModelError * std::max(f.row_variance()[row], row < 3 ? vibration_ : 0.0);
   }
-  /// What a jump of the row's sensor, of `variance`, would explain of this tick's innovation; nats.
-  double jump(const Filter& f, std::size_t row, double variance) const noexcept {
-    const double v = spread(f, row);
-    const double wide = log_normal(squared(f, row), v + variance);
-    return wide - std::max(log_normal(squared(f, row), v), faulty_[row] + std::log(kShaken));
+  /// What jumps of the gyro, of one `sigma_rad_s`, would explain of this tick's innovations of `axes`; nats.
+  double jump(const Filter& f, const Sample& used, const std::array<bool, 3>& axes,
+              double sigma_rad_s) const noexcept {
+    double sum = 0.0;
+    for (std::size_t row = 0; row < 3; ++row) {
+      if (!axes[row] || !comes(used, row)) continue;
+      const double v = spread(f, row);
+      sum += log_normal(squared(f, row), v + sigma_rad_s * sigma_rad_s) -
+             contaminated(row, log_normal(squared(f, row), v));
+    }
+    return std::min(sum, kOutlier);
   }
   static double squared(const Filter& f, std::size_t row) noexcept {
     return f.row_innovation()[row] * f.row_innovation()[row];
@@ -126,6 +132,13 @@ class Evidence {
     return -0.5 * (std::log(2.0 * kPi * variance) + squared / variance);
   }
 
+  /// A sample of the IMU may be shaken: then it reads as a faulty one's would.
+  double contaminated(std::size_t row, double log_density) const noexcept {
+    if (row < 3) return std::max(log_density, faulty_[row] + std::log(kShaken));
+    if (row >= kAccelRow) return std::max(log_density, faulty_[row] + std::log(kFelt));
+    return log_density;
+  }
+
   /// Of the rows that came; those that are not used, as a faulty sensor has them.
   double log_density(const Filter& f, const Sample& used, const Sample& came, double* misfit) const noexcept {
     double sum = 0.0;
@@ -136,13 +149,11 @@ class Evidence {
         continue;
       }
       const double variance = spread(f, row);
-      const double peak = -0.5 * std::log(2.0 * kPi * variance);
-      double density = peak - 0.5 * squared(f, row) / variance;
-      if (!(density > -1e6)) return -1e6;  // the filter has diverged
-      if (row < 3) density = std::max(density, faulty_[row] + std::log(kShaken));
-      if (row >= kAccelRow) density = std::max(density, faulty_[row] + std::log(kFelt));
+      const double normal = log_normal(squared(f, row), variance);
+      if (!(normal > -1e6)) return -1e6;  // the filter has diverged
+      const double density = contaminated(row, normal);
       sum += density;
-      *misfit += peak - density;
+      *misfit += log_normal(0.0, variance) - density;
     }
     return sum;
   }

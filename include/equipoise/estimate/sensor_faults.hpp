@@ -203,10 +203,14 @@ class SensorFaults {
     const FaultHypothesis& h = kHypotheses[i];
     Member& m = members_[i];
     if (h.kind == FaultHypothesis::kBias) {
-      // What it follows already is no new jump, unless the axes that balance say so.
-      const double all = jump_explains(z, {true, true, true});
-      const bool anew = m.ratio <= -kMargin || jump_explains(z, p_.balances) > std::max(m.ratio, 0.0);
-      if (anew && all > -kMargin) return jumped(i, u, z, all);
+      const Sample used = used_.of(z);
+      if (moved(used)) {
+        // What it follows already is no new jump, unless the axes that balance say so.
+        const double all = weigh_.jump(healthy_, used, {true, true, true}, kJump_rad_s);
+        const bool anew = m.ratio <= -kMargin ||
+                          weigh_.jump(healthy_, used, p_.balances, kJump_rad_s) > std::max(m.ratio, 0.0);
+        if (anew && all > -kMargin) return jumped(i, u, z, all);
+      }
       if (m.ratio <= -kMargin) return;
     } else if (m.ratio <= -kMargin || (h.healthy() && ticks_ - m.since > kEventTicks)) {
       begin(i, before_);
@@ -236,17 +240,14 @@ class SensorFaults {
     return std::max(kLeastJump_rad_s, 3.0 * weigh_.vibration_rad_s());
   }
 
-  /// Had the gyro's bias jumped just now, what would that explain of `axes`? (Willsky and Jones 1976)
-  double jump_explains(const Sample& z, const std::array<bool, 3>& axes) const noexcept {
-    double sum = 0.0;
+  /// An axis that balances is off by what may be a jump of the gyro's bias (Willsky and Jones 1976).
+  bool moved(const Sample& used) const noexcept {
     double most = 0.0;
-    const Sample used = used_.of(z);
     for (std::size_t i = 0; i < 3; ++i) {
-      if (!axes[i] || !Evidence::comes(used, i)) continue;
-      sum += weigh_.jump(healthy_, i, kJump_rad_s * kJump_rad_s);
-      if (p_.balances[i]) most = std::max(most, std::abs(healthy_.row_innovation()[i]));
+      if (p_.balances[i] && Evidence::comes(used, i))
+        most = std::max(most, std::abs(healthy_.row_innovation()[i]));
     }
-    return most > least_jump_rad_s() ? std::min(sum, Evidence::kOutlier) : -kMargin;
+    return most > least_jump_rad_s();
   }
   void jumped(std::size_t i, const Input& u, const Sample& z, double ratio) noexcept {
     begin(i, before_);

@@ -13,6 +13,8 @@ namespace equipoise {
 template <int N>
 class SlowDrift {
  public:
+  static constexpr double kFoundAnew_rad_s = 0.15;  // of a bias that has jumped: what one noisy sample leaves
+
   void reset(const Vec<N>& value) noexcept {
     value_ = mean_ = value;
     explained_ = passing_ = 0.0;

@@ -2,6 +2,7 @@
 
 #include "equipoise/estimate/encoder_slip.hpp"
 #include "equipoise/estimate/heun.hpp"
+#include "equipoise/estimate/push_response.hpp"
 
 namespace equipoise {
 
@@ -130,18 +131,12 @@ MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
       kinematics_(robot),
       filter_(Model(robot, params.disturbance_time_constant_s), params.filter, params.precision),
       time_(params.sensor_age_s) {
-  // Gravity turns the body by its weight, the motors turn body and ball against each other.
-  const MbbrCoefficients c = mbbr_coefficients(robot);
-  constexpr double kLeant_rad = 1e-6;
-  const auto rates = [](const Observable::State& x_dot) {
+  const auto rates = [c = mbbr_coefficients(robot)](double lean_rad, double u) {
+    const Observable::State x_dot =
+        Observable::rate(c, lean_rad * Observable::State::Unit(Model::kThetaX), u * Vec3::UnitX());
     return Vec2(x_dot(Model::kThetaDotX), x_dot(Model::kPhiDotX));
   };
-  const Vec2 on_body =
-      rates(Observable::rate(c, kLeant_rad * Observable::State::Unit(Model::kThetaX), Vec3::Zero())) /
-      (kLeant_rad * robot.m_t * kGravity_m_s2 * robot.l);
-  const Vec2 on_ball =
-      rates(Observable::rate(c, Observable::State::Zero(), Vec3::UnitX())) / robot.k1 + on_body;
-  per_push_ = kTickS * (robot.l * on_body + robot.r * on_ball);
+  per_push_ = push_response({robot.m_t, robot.l, robot.r, robot.k1}, rates);
   start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
 }
 

@@ -8,7 +8,6 @@ constexpr double kMountError_rad = 0.0016;  // that is left when the filter has 
 // 0.06 rad/s.
 constexpr double kSuddenTurn_rad = 0.02;
 constexpr double kLately_s = 0.1;
-constexpr double kFoundAnew_rad_s = 0.15;  // of a bias that has jumped: what one noisy sample leaves open
 
 template <class Filter, std::size_t M>
 void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
@@ -117,7 +116,7 @@ void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   }
   const int jumps = faults_.bias_jumps();
   faults_.step(ekf_, u, z, x.omega_B);
-  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(kFoundAnew_rad_s);
+  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(bias_drift_.kFoundAnew_rad_s);
   // What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
   const double turns_rad_s = x.omega_B.z();
   turned_lately_rad_s_ += kTickS / kLately_s * (turns_rad_s - turned_lately_rad_s_);

@@ -2,6 +2,7 @@
 
 #include "equipoise/estimate/encoder_slip.hpp"
 #include "equipoise/estimate/heun.hpp"
+#include "equipoise/estimate/push_response.hpp"
 
 namespace equipoise {
 namespace {
@@ -175,21 +176,14 @@ MipEkf::MipEkf(const MipParameters& robot, const Params& params)
       filter_(Model(robot, params.options, params.disturbance_time_constant_s), params.filter,
               params.precision),
       time_(params.sensor_age_s) {
-  // Gravity turns the body by its weight, the motors turn body and wheels against each other. A force at the
-  // centre of mass does work on both: it moves by r (theta + phi) + l theta.
   const Model model(robot, params.options, params.disturbance_time_constant_s);
-  const auto rates = [&model](const Model::Motion& x, const Vec2& u) {
+  const auto rates = [&model](double lean_rad, double u) {
     Model::Motion x_dot;
     Mat<6, 6> A;
-    model.derivative(x, u, x_dot, A);
+    model.derivative(lean_rad * Model::Motion::Unit(Model::kTheta), u * Vec2::UnitX(), x_dot, A);
     return Vec2(x_dot(Model::kThetaDot), x_dot(Model::kPhiDot));
   };
-  constexpr double kLeant_rad = 1e-6;
-  const Model::Motion upright = Model::Motion::Zero();
-  const Vec2 on_body = rates(kLeant_rad * Model::Motion::Unit(Model::kTheta), Vec2::Zero()) /
-                       (kLeant_rad * robot.m_b * kGravity_m_s2 * robot.l);
-  const Vec2 on_wheels = rates(upright, Vec2::UnitX()) / (2.0 * robot.k1);
-  per_push_ = kTickS * ((robot.r + robot.l) * on_body + robot.r * on_wheels);
+  per_push_ = push_response({robot.m_b, robot.l, robot.r, 2.0 * robot.k1}, rates);
   start(0.0, Vec3::Zero(), Vec2::Zero());
 }
 

@@ -3,8 +3,6 @@
 namespace equipoise {
 namespace {
 
-constexpr double kFoundAnew_rad_s = 0.15;  // of a bias that has jumped: what one noisy sample leaves open
-
 /// Play in the gears, by far more than the encoders' counts (0.003 rad). A wheel without load turns as fast
 /// as the back-EMF lets it.
 SensorFaultsParams sensor_faults(const MipEstimatorParams& params) {
@@ -135,7 +133,7 @@ void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   }
   const int jumps = faults_.bias_jumps();
   faults_.step(ekf_, u, z, body_rates(x));
-  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(kFoundAnew_rad_s);
+  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(bias_drift_.kFoundAnew_rad_s);
   bias_drift_.update(ekf_.x().segment<1>(MipEkfModel::kGyroBias), 0.0, 0.0);
   const Vec2 position = x.position_W_m;
   x = ekf_.estimate();
