@@ -5,9 +5,8 @@ import subprocess
 
 import numpy as np
 import pytest
-from equipoise_tools.experiments.runs import binary
 from equipoise_tools.foreign_log import geometry
-from equipoise_tools.paths import repository_root
+from equipoise_tools.paths import binary, repository_root
 
 CONFIGS = [
     *sorted((repository_root() / "config/real").glob("*.toml")),

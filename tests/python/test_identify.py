@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pandas as pd
 import pytest
-from equipoise_tools.experiments.runs import binary
+from equipoise_tools.paths import binary
 from equipoise_tools.table import matlab
 from scipy.signal import lfilter
 

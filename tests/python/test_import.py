@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from equipoise_robot import Log
-from equipoise_tools.experiments.runs import binary
+from equipoise_tools.paths import binary
 from scipy.io import savemat
 
 import lcm

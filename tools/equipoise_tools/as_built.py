@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from . import style
-from .campaign import binary, read_parts
+from .campaign import read_parts
 from .campaign_page import _column, at_point, error_table, points_of, survival_table
 from .campaign_statistics import survival_over_time
-from .paths import UserError, repository_root
+from .paths import UserError, binary, repository_root
 from .style import plt
 
 POINT = (1.0, 0.2)  # Hz, m/s

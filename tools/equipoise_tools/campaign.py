@@ -17,16 +17,9 @@ import time
 from pathlib import Path
 
 from .campaign_page import write_page
-from .paths import UserError, repository_root
+from .paths import UserError, binary, repository_root
 
 RUNS = ("0,0.3", "0.5,0.3", "1,0.2", "1.5,0.2", "2,0.2", "3,0.2")
-
-
-def binary() -> Path:
-    path = Path(os.environ.get("EQUIPOISE_BINARY", repository_root() / "build" / "host" / "equipoise"))
-    if not path.exists():
-        raise UserError(f"{path}: not built; run tools/campaign")
-    return path
 
 
 def identity(trial: dict) -> tuple:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
-from .paths import UserError, repository_root
+from .paths import UserError, binary
 from .planar_model import STEP_S, Motion
 
 UNITS = {
@@ -24,15 +24,7 @@ UNITS = {
 
 def configuration(path: Path, settings: list[str] | None = None) -> dict[str, dict[str, Any]]:
     """The tables in force, as the firmware reads them."""
-    command = [
-        str(repository_root() / "build/host/equipoise"),
-        "config",
-        "show",
-        "--config",
-        str(path),
-        "--json",
-        "-",
-    ]
+    command = [str(binary()), "config", "show", "--config", str(path), "--json", "-"]
     for setting in settings or []:
         command += ["--set", setting]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -47,7 +39,7 @@ def configuration(path: Path, settings: list[str] | None = None) -> dict[str, di
 
 def geometry(robot: dict[str, Any], axes: np.ndarray | None = None) -> dict[str, Any]:
     """Of a ball-bot's [robot], as the firmware has it; with measured axes also how they differ."""
-    command = [str(repository_root() / "build/host/equipoise"), "geometry", "--json", "-"]
+    command = [str(binary()), "geometry", "--json", "-"]
     command += ["--alpha-deg", str(robot["wheel_latitude_deg"])]
     command += ["--azimuth-deg", str(robot["wheel_azimuth_deg"])]
     if robot.get("wheel_tilt_deg", "orthogonal") != "orthogonal":

@@ -19,14 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from .campaign import binary
+from . import mujoco_client
 from .entry import leave
 from .foreign_log import configuration, geometry
 from .lockstep_client import DT
-from .mujoco_client import balance, import_mujoco
-from .paths import UserError, import_lcm_types
+from .paths import UserError, binary, import_lcm_types
 
-HELD_S = 0.5  # by a hand, upright: it settles on its floor meanwhile
 AXES = {"x": 0, "y": 1, "z": 2}
 
 
@@ -36,7 +34,7 @@ def signed(name: str) -> tuple[float, str]:
 
 def compiled(path: Path, described: dict[str, Any]) -> Any:
     """The model with free base, locked joints and a floor."""
-    mujoco = import_mujoco()
+    mujoco = mujoco_client.import_mujoco()
     try:
         if path.suffix == ".urdf":  # MuJoCo would look for its pictures and merge its base into the world
             text = re.sub(r"<visual>.*?</visual>", "", path.read_text(), flags=re.S)
@@ -75,12 +73,13 @@ def compiled(path: Path, described: dict[str, Any]) -> Any:
     return spec.compile()
 
 
-class Robot:
+class Robot(mujoco_client.Robot):
     """As mujoco_client.balance wants it."""
 
     def __init__(self, path: Path, described: dict[str, Any], config: dict[str, Any], tilt_rad: float):
-        self.mujoco = import_mujoco()
+        self.mujoco = mujoco_client.import_mujoco()
         self.model = compiled(path, described)
+        self.step_s = self.model.opt.timestep
         self.data = self.mujoco.MjData(self.model)
         self.joints = [(sign, self.model.joint(name)) for sign, name in map(signed, described["wheels"])]
         self.base = self.model.body(described["base"])
@@ -127,9 +126,6 @@ class Robot:
     def R_WB(self) -> np.ndarray:
         return self.data.xmat[self.base.id].reshape(3, 3)
 
-    def tilt_rad(self) -> float:
-        return float(np.arccos(np.clip(self.R_WB()[2, 2], -1.0, 1.0)))
-
     def speed_m_s(self) -> float:
         return float(np.hypot(*self.data.qvel[self.velocity : self.velocity + 2]))
 
@@ -138,7 +134,7 @@ class Robot:
 
     def advance(self, duty: np.ndarray, enabled: bool) -> None:
         self.held = self.held and not enabled
-        for _ in range(round(DT / self.model.opt.timestep)):
+        for _ in range(round(DT / self.step_s)):
             for i, (sign, joint) in enumerate(self.joints):
                 at = joint.dofadr[0]
                 back = 0.0 if joint.damping[0] > 0.0 else self.k * sign * self.data.qvel[at]
@@ -190,16 +186,11 @@ class Robot:
         lib.mj_sensorAcc(m, d)
         lib.mj_Euler(m, d)
 
-    def late(self, which: int) -> np.ndarray:
-        steps = self.delays[which] / self.model.opt.timestep
-        k, share = int(steps), steps % 1.0
-        return (1 - share) * self.past[k][which] + share * self.past[k + 1][which]
-
     def sensors(self, step: int) -> Any:
         message = import_lcm_types().lockstep_sensors_t()
         message.step, message.t_s, message.battery_V = step, step * DT, self.volts
-        message.gyro_B_rad_s = self.late(0).tolist()
-        message.specific_force_B_m_s2 = self.late(1).tolist()
+        message.gyro_B_rad_s = self._late(0, self.delays[0]).tolist()
+        message.specific_force_B_m_s2 = self._late(1, self.delays[1]).tolist()
         angles = [float(sign * self.data.qpos[joint.qposadr[0]]) for sign, joint in self.joints]
         message.wheel_angle_rad = [*angles, *[0.0] * (4 - len(angles))]
         return message
@@ -252,7 +243,7 @@ def run(model: Path, map_file: Path, given: argparse.Namespace) -> dict[str, Any
         with subprocess.Popen(
             command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         ) as firmware:
-            result = balance(str(socket), given.duration_s, robot)  # type: ignore[arg-type]
+            result = mujoco_client.balance(str(socket), given.duration_s, robot)
             _, said = firmware.communicate(timeout=60)
     return result | {"said": said.strip().splitlines()[-1:] if result["ended"] != "finished" else []}
 

@@ -87,6 +87,8 @@ def quaternion_matrix(q: np.ndarray) -> np.ndarray:
 class Robot:
     """The engine's robot: `advance` with duties, `sensors` as the boundary wants them."""
 
+    step_s = STEP
+
     def __init__(
         self, tilt_rad: float = 0.02, grip: float = 0.6, torsion_radius_m: float = 0.005, seed: int = 1
     ):
@@ -146,7 +148,7 @@ class Robot:
             )
 
     def _late(self, which: int, delay_s: float) -> np.ndarray:
-        steps = delay_s / STEP
+        steps = delay_s / self.step_s
         k, share = int(steps), steps % 1.0
         return (1 - share) * self.past[k][which] + share * self.past[k + 1][which]
 

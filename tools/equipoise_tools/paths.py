@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
 from equipoise_robot.errors import UserError
 
-__all__ = ["UserError", "import_lcm_types", "repository_root"]
+__all__ = ["UserError", "binary", "import_lcm_types", "repository_root"]
 
 
 def repository_root() -> Path:
     return Path(__file__).resolve().parents[2]
+
+
+def binary() -> Path:
+    path = Path(os.environ.get("EQUIPOISE_BINARY", repository_root() / "build" / "host" / "equipoise"))
+    if not path.exists():
+        raise UserError(f"{path}: not built; run ./tools/run once")
+    return path
 
 
 def import_lcm_types():

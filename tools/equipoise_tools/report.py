@@ -15,7 +15,7 @@ from .figures import draw_report, headline
 from .interactive import UPLOT, Run
 from .metrics import Summary, summarise
 from .page import comparison, estimator_rows, number_rows, page
-from .paths import UserError, repository_root
+from .paths import UserError, binary
 from .style import plt
 
 
@@ -46,12 +46,9 @@ WHAT_IF = (
 
 def what_if(log: Path, changes: list[str], out: Path) -> Path:
     """The log of `equipoise replay --set`, in the folder."""
-    equipoise = repository_root() / "build/host/equipoise"
-    if not equipoise.exists():
-        raise UserError(f"{equipoise}: not built; run ./tools/run once")
     changed = out / "what-if.lcm"
     out.mkdir(parents=True, exist_ok=True)
-    command = [equipoise, "replay", log, "--log", changed, "--json", "/dev/null"]
+    command = [binary(), "replay", log, "--log", changed, "--json", "/dev/null"]
     for change in changes:
         command += ["--set", change]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .campaign import RUNS, binary, pair
+from .campaign import RUNS, pair
 from .campaign_statistics import quantile_interval, wilson
-from .paths import UserError, repository_root
+from .paths import UserError, binary, repository_root
 from .tuned_run import Flights, NotFlown
 
 FALL_COSTS = 100.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -16,7 +15,7 @@ import numpy as np
 from equipoise_robot.log import Log, read_log
 
 from .. import metrics, names, published
-from ..paths import UserError, repository_root
+from ..paths import UserError, binary, repository_root
 from .data import Data, Ran, thinned
 
 MBBR, MIP = "config/mbbr.toml", "config/edumip.toml"
@@ -40,13 +39,6 @@ PUT_IN = {
     "kf_attitude": PACKETS,
     "prediction (5.33)": "the friction term that jumps is put into the prediction",
 }
-
-
-def binary() -> Path:
-    path = Path(os.environ.get("EQUIPOISE_BINARY", repository_root() / "build" / "host" / "equipoise"))
-    if not path.exists():
-        raise UserError(f"{path}: not built; run tools/experiments, or cmake --build build/host")
-    return path
 
 
 def equipoise(*arguments: object, fails: bool = False) -> str:
