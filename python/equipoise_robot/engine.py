@@ -33,8 +33,16 @@ class Engine:
         self.back = np.zeros(4)
 
     def start(self) -> None:
-        self.mujoco.mju_mat2Quat(self.data.qpos[3:7], self.R_WB)
-        self.mujoco.mj_forward(self.model, self.data)
+        """At the attitude `R_WB`; a robot on two wheels turns about its y axis until both are on the floor."""
+        data, lib = self.data, self.mujoco
+        lib.mju_mat2Quat(data.qpos[3:7], self.R_WB)
+        lib.mj_forward(self.model, data)
+        if not self.has_ball:
+            normal = self.R_WB.reshape(3, 3).T @ data.geom("floor").xmat[2::3]
+            about_y, leant = np.zeros(4), data.qpos[3:7].copy()
+            lib.mju_axisAngle2Quat(about_y, np.array([0.0, 1.0, 0.0]), np.arctan2(normal[0], normal[2]))
+            lib.mju_mulQuat(data.qpos[3:7], leant, about_y)
+            lib.mj_forward(self.model, data)
         self.read()
 
     def step(self) -> None:

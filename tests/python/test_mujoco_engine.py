@@ -121,6 +121,15 @@ def test_both_worlds_agree_on_the_typical_robot(root, config, yaw_hz, drive_mps)
 
 
 @pytest.mark.slow
+def test_an_edumip_starts_on_both_wheels(root):
+    """One that leans sideways would drop onto its second wheel, which its gyro y takes for a fault."""
+    trial = {"seed": 161, "robot": 161, "yaw_hz": 0.0, "drive_mps": 0.2, "duration_s": 5.0, "floor": "calm"}
+    row = mujoco_engine.run(trial | {"fidelity": "built2025"}, str(root / "config/edumip.toml"), [])
+    assert row["ended"] == "finished"
+    assert not row["excluded_healthy"]
+
+
+@pytest.mark.slow
 def test_a_twin_shows_what_detection_did(root):
     trial = {"robot": 3, "seed": 3, "yaw_hz": 1.0, "drive_mps": 0.2, "duration_s": 6.0, "floor": "disturbed"}
     trial["fidelity"] = "built2025"
