@@ -33,7 +33,7 @@ class Engine:
         self.back = np.zeros(4)
 
     def start(self) -> None:
-        """At the attitude `R_WB`; a robot on two wheels turns about its y axis until both are on the floor."""
+        """At the attitude `R_WB`; a robot on two wheels turned about its y until both are on the floor."""
         data, lib = self.data, self.mujoco
         lib.mju_mat2Quat(data.qpos[3:7], self.R_WB)
         lib.mj_forward(self.model, data)
