@@ -130,6 +130,19 @@ def test_an_edumip_starts_on_both_wheels(root):
 
 
 @pytest.mark.slow
+def test_nothing_pushes_on_a_calm_floor(root):
+    """The world's own pushes are off: how strong they would be changes nothing."""
+    trial = {"seed": 1, "robot": 1, "yaw_hz": 0.0, "drive_mps": 0.2, "duration_s": 16.0, "floor": "calm"}
+    trial["fidelity"] = "full"
+    path = str(root / "config/edumip.toml")
+    rows = [
+        mujoco_engine.run(trial, path, [f"population.random_pushes.force_N=[{f}, {f}]"]) for f in (0.5, 3.0)
+    ]
+    assert rows[0]["attitude_rmse_rad"] is not None
+    assert rows[0]["attitude_rmse_rad"] == rows[1]["attitude_rmse_rad"]
+
+
+@pytest.mark.slow
 def test_a_twin_shows_what_detection_did(root):
     trial = {"robot": 3, "seed": 3, "yaw_hz": 1.0, "drive_mps": 0.2, "duration_s": 6.0, "floor": "disturbed"}
     trial["fidelity"] = "built2025"

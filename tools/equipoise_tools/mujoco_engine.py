@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import math
 import sys
@@ -17,6 +18,7 @@ import numpy as np
 from equipoise_robot import models
 from equipoise_robot.engine import Engine
 
+from .foreign_log import configuration
 from .paths import UserError
 
 PUSHES_AT_S = (8.0, 16.0, 24.0)
@@ -47,6 +49,13 @@ def disturbances(seed: int) -> tuple[models.Floor, list[str]]:
     return floor, [f"pushes=[{', '.join(pushes)}]"]
 
 
+@functools.cache
+def no_random_pushes(config: str, fidelity: str) -> tuple[str, ...]:
+    """The floor says what pushes the robot; a world that has pushes of its own goes without."""
+    table = f"world.{fidelity}.random_pushes"
+    return (f"{table}.every_s=0",) if table in configuration(Path(config)) else ()
+
+
 def run(trial: dict, config: str, settings: list[str]) -> dict:
     """One trial as `equipoise trials` has it, on a calm or a disturbed floor."""
     from equipoise_robot import _core
@@ -60,7 +69,8 @@ def run(trial: dict, config: str, settings: list[str]) -> dict:
     request.estimator, request.controller = trial.get("estimator", ""), trial.get("controller", "")
     request.yaw_rate_rad_s, request.drive_mps = 2.0 * np.pi * trial["yaw_hz"], trial["drive_mps"]
     request.duration_s = trial["duration_s"]
-    request.set = [f"world.{request.fidelity}.{text}" for text in world] + settings
+    request.set = [f"world.{request.fidelity}.{text}" for text in world]
+    request.set += [*no_random_pushes(config, request.fidelity), *settings]
     robot = _core.robot_type(config)
 
     def make(dimensions: str, inputs: np.ndarray, outputs: np.ndarray):
