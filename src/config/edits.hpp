@@ -5,7 +5,6 @@
 
 #include <toml++/toml.h>
 
-#include <istream>
 #include <string>
 
 #include "equipoise/overrides.hpp"

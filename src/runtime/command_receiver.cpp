@@ -1,7 +1,6 @@
 #include "equipoise/runtime/command_receiver.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "equipoise/runtime/monotonic.hpp"

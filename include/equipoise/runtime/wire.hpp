@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <equipoise/command_t.hpp>
 #include <equipoise/health_t.hpp>

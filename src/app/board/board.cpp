@@ -1,6 +1,5 @@
 #include "app/board/board.hpp"
 
-#include <algorithm>
 #include <cstring>
 #include <filesystem>
 

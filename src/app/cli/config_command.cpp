@@ -1,6 +1,5 @@
 // equipoise config: what a configuration says, how two differ, and what a key means: its value, unit and
 // range, where it stands, and the source given there.
-#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <fstream>

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <cstdio>
 
 #include "app/text/format.hpp"
 

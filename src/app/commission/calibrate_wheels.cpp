@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "app/import/wheel_order.hpp"
 #include "app/text/format.hpp"

@@ -6,7 +6,6 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "app/io/hardware.hpp"
 #include "equipoise/runtime/heartbeat.hpp"

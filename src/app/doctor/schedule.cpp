@@ -3,7 +3,6 @@
 #include <array>
 #include <climits>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include "app/doctor/doctor.hpp"

@@ -1,7 +1,5 @@
 #include "app/evaluate/fault_run.hpp"
 
-#include <cmath>
-
 #include "app/io/plant_backend.hpp"
 #include "equipoise/actuate/degraded.hpp"
 #include "equipoise/runtime/loop.hpp"

@@ -4,7 +4,6 @@
 // once they were cut, a loop that comes back must have let go first.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <string>

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
 #include "app/import/regression.hpp"
 #include "app/import/signals.hpp"

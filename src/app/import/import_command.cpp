@@ -1,6 +1,5 @@
 // `equipoise import`.
 #include <cstdio>
-#include <filesystem>
 
 #include "app/cli/commands.hpp"
 #include "app/import/checks.hpp"

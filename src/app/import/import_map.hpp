@@ -3,7 +3,6 @@
 // key. Start-up only.
 #pragma once
 
-#include <array>
 #include <limits>
 #include <map>
 #include <string>

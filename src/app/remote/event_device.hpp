@@ -3,7 +3,6 @@
 // wireless one that is out of range leaves its last stick behind. Not RT-safe.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "app/remote/remote_file.hpp"

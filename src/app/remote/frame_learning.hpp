@@ -2,7 +2,6 @@
 // frame, what came when the button was let go, or why neither can be said. No files, no clock.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

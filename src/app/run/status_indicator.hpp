@@ -7,7 +7,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <string>
 #include <thread>
 
 #include "app/board/board.hpp"

@@ -1,7 +1,6 @@
 #include "app/run/wires.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 
 #include "app/cli/commands.hpp"

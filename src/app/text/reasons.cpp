@@ -1,6 +1,5 @@
 #include "app/text/reasons.hpp"
 
-#include <cmath>
 #include <cstdio>
 
 namespace equipoise::app {

@@ -1,7 +1,6 @@
 #include "robots/mbbr/drive.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
 
 namespace equipoise {
 namespace {
