@@ -18,7 +18,7 @@ namespace equipoise::python {
 
 using Array = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>;
 
-class Episodes {
+class Episodes : NoCopy {
  public:
   /// A tick upright is worth 1, less the squares of the weighted observation and those of the action times
   /// `action_cost`, down to 0; where the robot is lost it is worth nothing.
@@ -45,9 +45,6 @@ class Episodes {
     if (static_cast<int>(weights_.size()) != width())
       throw nb::value_error("every number of the observation has a weight");
   }
-
-  Episodes(const Episodes&) = delete;
-  Episodes& operator=(const Episodes&) = delete;
 
   int count() const { return static_cast<int>(episodes_.size()); }
   int wheels() const { return wheels_; }

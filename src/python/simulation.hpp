@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "app/sim/sim_job.hpp"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/plant/engine.hpp"
 #include "equipoise/runtime/fields.hpp"
 #include "robots/robot_list.hpp"
@@ -114,11 +115,8 @@ struct Hooks {
 };
 
 /// A robot that stands and waits for the next action.
-class Episode {
+class Episode : NoCopy {
  public:
-  Episode() = default;
-  Episode(const Episode&) = delete;
-  Episode& operator=(const Episode&) = delete;
   virtual ~Episode() = default;
   /// One tick with the motors driven by `wheels`, -1 to 1 each; false when the robot is lost.
   virtual bool step(const double* wheels) = 0;
@@ -127,11 +125,8 @@ class Episode {
 };
 
 /// One robot for all configurations of it.
-class Simulated {
+class Simulated : NoCopy {
  public:
-  Simulated() = default;
-  Simulated(const Simulated&) = delete;
-  Simulated& operator=(const Simulated&) = delete;
   virtual ~Simulated() = default;
 
   virtual int wheels() const = 0;

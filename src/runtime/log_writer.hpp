@@ -14,6 +14,8 @@
 #include <thread>
 #include <vector>
 
+#include "equipoise/no_copy.hpp"
+
 namespace equipoise::runtime {
 
 struct LogLimits {
@@ -23,12 +25,9 @@ struct LogLimits {
   bool keep_previous = false;       // a log of the same name is moved aside rather than replaced
 };
 
-class LogWriter {
+class LogWriter : NoCopy {
  public:
-  LogWriter() = default;
   ~LogWriter() { close(); }
-  LogWriter(const LogWriter&) = delete;
-  LogWriter& operator=(const LogWriter&) = delete;
 
   /// False when the file cannot be created; error() says why.
   bool open(const std::string& path, const LogLimits& limits);

@@ -27,7 +27,7 @@ std::string upper(std::string text) {
 }  // namespace
 
 /// Log file and LCM connection; used by the telemetry thread only.
-class Telemetry::Writer {
+class Telemetry::Writer : NoCopy {
  public:
   Writer(const TelemetryOptions& options, TelemetryReport* report, std::atomic<bool>* log_failed)
       : options_(options), report_(report), log_failed_(log_failed) {
@@ -54,8 +54,6 @@ class Telemetry::Writer {
     close_log();
     if (lcm_ != nullptr) lcm_destroy(lcm_);
   }
-  Writer(const Writer&) = delete;
-  Writer& operator=(const Writer&) = delete;
 
   void write(const TickRecord& r) {
     publish_now_ = lcm_ != nullptr && publish_due();

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "equipoise/no_copy.hpp"
 #include "equipoise/plant/sensors.hpp"
 
 namespace equipoise {
@@ -19,11 +20,8 @@ struct EngineMotion {
   Vec3 velocity_W_m_s = Vec3::Zero();  // of the same point
 };
 
-class Engine {
+class Engine : NoCopy {
  public:
-  Engine() = default;
-  Engine(const Engine&) = delete;
-  Engine& operator=(const Engine&) = delete;
   virtual ~Engine() = default;
   /// At rest on the floor.
   virtual void start(const Mat3& R_WB, EngineMotion* motion) = 0;

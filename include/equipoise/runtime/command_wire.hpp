@@ -8,18 +8,16 @@
 #include <string>
 #include <vector>
 
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/frames.hpp"
 
 namespace equipoise::runtime {
 
-class CommandWire {
+class CommandWire : NoCopy {
  public:
   using Received = std::function<void(const std::uint8_t*, std::size_t)>;
 
-  CommandWire() = default;
   virtual ~CommandWire() = default;
-  CommandWire(const CommandWire&) = delete;
-  CommandWire& operator=(const CommandWire&) = delete;
 
   /// At most this long, ms.
   virtual void listen(int milliseconds, const Received& received) = 0;
@@ -43,12 +41,9 @@ enum class WireSide { kRobot, kOwner };  // the robot hears commands and says it
 std::unique_ptr<CommandWire> open_lcm_wire(const std::string& url, WireSide side);
 
 /// Bytes without blocking: how many were read or taken; 0: none now.
-class ByteStream {
+class ByteStream : NoCopy {
  public:
-  ByteStream() = default;
   virtual ~ByteStream() = default;
-  ByteStream(const ByteStream&) = delete;
-  ByteStream& operator=(const ByteStream&) = delete;
 
   virtual std::size_t read(std::uint8_t* out, std::size_t size) = 0;
   virtual std::size_t write(const std::uint8_t* data, std::size_t size) = 0;

@@ -6,6 +6,8 @@
 #include <atomic>
 #include <cstdint>
 
+#include "equipoise/no_copy.hpp"
+
 namespace equipoise::runtime {
 
 struct HeartbeatPage {
@@ -48,15 +50,13 @@ class BeatWatch {
 };
 
 /// Maps the page; throws std::runtime_error saying what is wrong with it.
-class SharedHeartbeat {
+class SharedHeartbeat : NoCopy {
  public:
   /// A new one in anonymous memory: whoever can write there can keep the motors on.
   SharedHeartbeat();
   /// Another process's, which hands over the descriptor: it must be such a page, sealed, and of our user.
   explicit SharedHeartbeat(int fd);
   ~SharedHeartbeat();
-  SharedHeartbeat(const SharedHeartbeat&) = delete;
-  SharedHeartbeat& operator=(const SharedHeartbeat&) = delete;
 
   HeartbeatPage& page() noexcept { return *page_; }
   int fd() const noexcept { return fd_; }  // closed with this, and in programs started

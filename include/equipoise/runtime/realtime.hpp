@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <string>
 
+#include "equipoise/no_copy.hpp"
+
 namespace equipoise::runtime {
 
 // SCHED_FIFO: the loop above everything but the guard, which must run when the loop hangs in a spin.
@@ -39,12 +41,10 @@ struct RealtimeResult {
   int error = 0;  // errno of what failed
 };
 
-class Realtime {
+class Realtime : NoCopy {
  public:
   explicit Realtime(const RealtimeWish& wish);
   ~Realtime();
-  Realtime(const Realtime&) = delete;
-  Realtime& operator=(const Realtime&) = delete;
 
   const std::array<RealtimeResult, kRealtimeItems>& results() const noexcept { return results_; }
   /// Everything that was wanted was obtained.

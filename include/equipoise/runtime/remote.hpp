@@ -4,16 +4,14 @@
 #pragma once
 
 #include "equipoise/actuate/safety.hpp"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise::runtime {
 
-class Remote {
+class Remote : NoCopy {
  public:
-  Remote() = default;
   virtual ~Remote() = default;
-  Remote(const Remote&) = delete;
-  Remote& operator=(const Remote&) = delete;
 
   /// Once per tick.
   virtual Command latest() noexcept = 0;

@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/record.hpp"
 #include "equipoise/runtime/spsc_queue.hpp"
 
@@ -42,13 +43,11 @@ struct TelemetryReport {
   std::string log_error;  // the log ends early, and why; what is in it is whole
 };
 
-class Telemetry {
+class Telemetry : NoCopy {
  public:
   /// Throws std::runtime_error if the log cannot be created.
   explicit Telemetry(const TelemetryOptions& options);
   ~Telemetry();
-  Telemetry(const Telemetry&) = delete;
-  Telemetry& operator=(const Telemetry&) = delete;
 
   void hand_over(const TickRecord& record) noexcept;
   /// For the loop's supervisor.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app/cli/description.hpp"
+#include "equipoise/no_copy.hpp"
 
 namespace equipoise::app {
 
@@ -66,12 +67,10 @@ class Subcommand {
   int* status_;
 };
 
-class CommandLine {
+class CommandLine : NoCopy {
  public:
   CommandLine(const std::string& help, const std::string& version);
   ~CommandLine();
-  CommandLine(const CommandLine&) = delete;
-  CommandLine& operator=(const CommandLine&) = delete;
 
   Subcommand root();
   /// Exit code. What an action throws is the caller's.

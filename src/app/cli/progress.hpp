@@ -19,8 +19,6 @@ class Progress {
   ~Progress() {
     if (drawn_) std::fprintf(stderr, "\r%70s\r", "");
   }
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
 
   void at(double share) {
     if (!shown_) return;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "app/io/hardware.hpp"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/heartbeat.hpp"
 #include "equipoise/types.hpp"
 
@@ -41,14 +42,12 @@ struct Stillness {
   double temperature_degC = 0.0;                    // 0: unknown
 };
 
-class ManualDrive {
+class ManualDrive : NoCopy {
  public:
   /// `heartbeat`: of the guard that holds the bridges; nullptr: nobody does.
   ManualDrive(rio_t io, Ask ask, runtime::HeartbeatPage* heartbeat = nullptr)
       : hardware_(io), io_(io), ask_(std::move(ask)), heartbeat_(heartbeat) {}
   ~ManualDrive() { (void)motors_off(); }
-  ManualDrive(const ManualDrive&) = delete;
-  ManualDrive& operator=(const ManualDrive&) = delete;
 
   /// Next tick's sample, all of it valid; JobError after a few that are not, or after Ctrl-C.
   RawSample sample();

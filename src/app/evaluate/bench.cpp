@@ -15,6 +15,7 @@
 #include "app/run/realtime_session.hpp"
 #include "app/text/json.hpp"
 #include "app/trial/firmware.hpp"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/recorded_samples.hpp"
 
@@ -29,7 +30,7 @@ struct BenchArguments {
 };
 
 /// Retired instructions of this thread in user space; absent where the kernel does not let us count.
-class Instructions {
+class Instructions : NoCopy {
  public:
   Instructions() {
     perf_event_attr what{};
@@ -43,8 +44,6 @@ class Instructions {
   ~Instructions() {
     if (fd_ >= 0) close(fd_);
   }
-  Instructions(const Instructions&) = delete;
-  Instructions& operator=(const Instructions&) = delete;
   nlohmann::json count() const {
     std::uint64_t n = 0;
     if (fd_ < 0 || read(fd_, &n, sizeof n) != sizeof n) return nullptr;

@@ -10,12 +10,13 @@
 #include <vector>
 
 #include "cutoff.h"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/heartbeat.hpp"
 
 namespace equipoise::app {
 
 /// What the guard switches.
-class Bridges {
+class Bridges : NoCopy {
  public:
   virtual ~Bridges() = default;
   virtual int enable() noexcept = 0;  // 0 or -errno
@@ -27,8 +28,6 @@ class BoardBridges final : public Bridges {
  public:
   explicit BoardBridges(const bbb_config_t& config);  // throws std::runtime_error naming the device
   ~BoardBridges() override { cutoff_close(&cutoff_); }
-  BoardBridges(const BoardBridges&) = delete;
-  BoardBridges& operator=(const BoardBridges&) = delete;
   int enable() noexcept override { return cutoff_enable(&cutoff_); }
   int off() noexcept override { return cutoff_off(&cutoff_); }
 
@@ -41,8 +40,6 @@ class FileBridges final : public Bridges {
  public:
   FileBridges(const std::string& enable, const std::vector<std::string>& pwm);
   ~FileBridges() override;
-  FileBridges(const FileBridges&) = delete;
-  FileBridges& operator=(const FileBridges&) = delete;
   int enable() noexcept override;
   int off() noexcept override;
 

@@ -44,7 +44,7 @@ std::string text_of(int fd) {
 }
 
 /// Both ends closed at the end, and in every child but by its own number.
-struct Pipe {
+struct Pipe : NoCopy {
   Pipe() {
     if (pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0)
       throw std::runtime_error(std::string("no pipe for the guard: ") + std::strerror(errno));
@@ -52,8 +52,6 @@ struct Pipe {
   ~Pipe() {
     for (const int fd : ends) close(fd);
   }
-  Pipe(const Pipe&) = delete;
-  Pipe& operator=(const Pipe&) = delete;
   std::array<int, 2> ends{};
 };
 

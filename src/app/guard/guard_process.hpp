@@ -7,16 +7,15 @@
 
 #include <string>
 
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/heartbeat.hpp"
 
 namespace equipoise::app {
 
-class GuardProcess {
+class GuardProcess : NoCopy {
  public:
   explicit GuardProcess(const std::string& board_path);
   ~GuardProcess();  // tells it to switch off and waits for that
-  GuardProcess(const GuardProcess&) = delete;
-  GuardProcess& operator=(const GuardProcess&) = delete;
 
   runtime::HeartbeatPage& page() noexcept { return heartbeat_.page(); }
 

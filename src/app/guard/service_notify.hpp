@@ -8,17 +8,17 @@
 #include <string>
 #include <thread>
 
+#include "equipoise/no_copy.hpp"
+
 namespace equipoise::app {
 
 /// One datagram to the service manager, without waiting; nothing where there is none.
 void notify_service_manager(const std::string& message);
 
-class ServiceNotify {
+class ServiceNotify : NoCopy {
  public:
   ServiceNotify();
   ~ServiceNotify();  // says "stopping"
-  ServiceNotify(const ServiceNotify&) = delete;
-  ServiceNotify& operator=(const ServiceNotify&) = delete;
 
   void note(std::int64_t tick) noexcept { tick_.store(tick, std::memory_order_relaxed); }
 

@@ -2,17 +2,15 @@
 // the backend is.
 #pragma once
 
+#include "equipoise/no_copy.hpp"
 #include "equipoise/samples.hpp"
 #include "robot_io.h"
 
 namespace equipoise::app {
 
 /// What stands behind a rio_t, function by function (robot_io.h).
-class Backend {
+class Backend : NoCopy {
  public:
-  Backend() = default;
-  Backend(const Backend&) = delete;
-  Backend& operator=(const Backend&) = delete;
   virtual ~Backend() = default;
 
   rio_t io() noexcept {
@@ -34,12 +32,10 @@ class Backend {
 };
 
 /// Owns a backend for the loop. `close` is motors off, then release.
-class Hardware {
+class Hardware : NoCopy {
  public:
   explicit Hardware(rio_t io) : io_(io) {}
   ~Hardware() { rio_close(&io_); }
-  Hardware(const Hardware&) = delete;
-  Hardware& operator=(const Hardware&) = delete;
 
   int wait_tick(std::int64_t* now_ns) noexcept { return rio_wait_tick(&io_, now_ns); }
 

@@ -10,18 +10,17 @@
 
 #include "app/io/hardware.hpp"
 #include "equipoise/lockstep_sensors_t.hpp"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/sense/calibrate.hpp"
 
 namespace equipoise::app {
 
 /// Listens on the path, for its owner only. A socket nobody listens on any more is replaced; anything else in
 /// the way is an InputError. Removes the path at the end.
-class LockstepServer {
+class LockstepServer : NoCopy {
  public:
   explicit LockstepServer(const std::string& path);
   ~LockstepServer();
-  LockstepServer(const LockstepServer&) = delete;
-  LockstepServer& operator=(const LockstepServer&) = delete;
 
   /// File descriptor of the next engine; -ETIMEDOUT, or -EINTR on a signal.
   int accept_engine(double timeout_s) const;

@@ -15,6 +15,7 @@
 #include "app/remote/hand_remote.hpp"
 #include "app/remote/seconds.hpp"
 #include "app/text/files.hpp"
+#include "equipoise/no_copy.hpp"
 #include "serial.h"
 
 namespace equipoise::app {
@@ -27,15 +28,13 @@ struct LearnArguments {
   double wait_s = 60.0;
 };
 
-struct Port {
+struct Port : NoCopy {
   explicit Port(const LearnArguments& a) {
     const int status = serial_open(&serial, a.port.c_str(), static_cast<std::uint32_t>(a.baud));
     if (status == -EINVAL) throw InputError("serial: " + std::to_string(a.baud) + " baud: 1200 to 115200");
     if (status < 0) throw std::runtime_error("serial: " + a.port + ": " + std::strerror(-status));
   }
   ~Port() { serial_close(&serial); }
-  Port(const Port&) = delete;
-  Port& operator=(const Port&) = delete;
 
   /// Until it was quiet for a second after something came, or nothing came for so long, or Enter; JobError
   /// when it does not end.

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "equipoise/no_copy.hpp"
+
 namespace equipoise::app {
 
 enum class HandAction {
@@ -41,12 +43,9 @@ struct Hand {
   bool heading_reset = false;
 };
 
-class HandDevice {
+class HandDevice : NoCopy {
  public:
-  HandDevice() = default;
   virtual ~HandDevice() = default;
-  HandDevice(const HandDevice&) = delete;
-  HandDevice& operator=(const HandDevice&) = delete;
 
   /// Waits at most this long, ms; returns at once on a press.
   virtual Hand look(int milliseconds) = 0;

@@ -8,17 +8,15 @@
 #include <array>
 #include <memory>
 
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/command_wire.hpp"
 
 namespace equipoise::app {
 
 /// Classic frames without blocking; false: none now, or no room now.
-class CanBus {
+class CanBus : NoCopy {
  public:
-  CanBus() = default;
   virtual ~CanBus() = default;
-  CanBus(const CanBus&) = delete;
-  CanBus& operator=(const CanBus&) = delete;
 
   virtual bool receive(can_frame* out) = 0;
   virtual bool send(const can_frame& frame) = 0;

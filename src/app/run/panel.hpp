@@ -12,6 +12,7 @@
 
 #include "app/board/board.hpp"
 #include "button.h"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/samples.hpp"
 #include "led.h"
 
@@ -36,12 +37,10 @@ class PanelGate {
   bool must_let_go_ = false;  // nothing starts under a hand that has just let go of the button
 };
 
-class Panel {
+class Panel : NoCopy {
  public:
   explicit Panel(const Board& board);
   ~Panel();  // LEDs dark
-  Panel(const Panel&) = delete;
-  Panel& operator=(const Panel&) = delete;
 
   Command limit(const Command& asked) noexcept {
     return gate_.limit(asked, paused_.load(std::memory_order_relaxed), mode_.load(std::memory_order_relaxed));

@@ -12,18 +12,17 @@
 #include "app/board/board.hpp"
 #include "can.h"
 #include "equipoise/actuate/safety.hpp"
+#include "equipoise/no_copy.hpp"
 #include "led.h"
 
 namespace equipoise::app {
 
-class StatusIndicator {
+class StatusIndicator : NoCopy {
  public:
   static constexpr std::uint32_t kStatusId = 0x1E0;
 
   explicit StatusIndicator(const Board& board);
   ~StatusIndicator();  // LEDs dark
-  StatusIndicator(const StatusIndicator&) = delete;
-  StatusIndicator& operator=(const StatusIndicator&) = delete;
 
   void tell(ArmState state, std::uint32_t reasons, double battery_V) noexcept {
     const double tenths = battery_V > 0.0 && battery_V < 25.5 ? 10.0 * battery_V : 0.0;

@@ -4,18 +4,17 @@
 
 #include "app/io/plant_backend.hpp"
 #include "app/sim/simulate.hpp"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"
 
 namespace equipoise::app {
 
-class SimulatedRun {
+class SimulatedRun : NoCopy {
  public:
   /// World, firmware, observer and stop must outlive it.
   SimulatedRun(World& world, Firmware& firmware, const ConfiguredRobot& robot, const SimOptions& options,
                const TickObserver& observe, const std::atomic<bool>& stop);
-  SimulatedRun(const SimulatedRun&) = delete;
-  SimulatedRun& operator=(const SimulatedRun&) = delete;
 
   /// To the end: time, a fall, or `stop`.
   SimSummary run();

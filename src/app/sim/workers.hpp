@@ -38,8 +38,6 @@ class Workers {
     news_.notify_all();
     for (std::thread& other : others_) other.join();
   }
-  Workers(const Workers&) = delete;
-  Workers& operator=(const Workers&) = delete;
 
   int threads() const noexcept { return static_cast<int>(shares_.size()); }
 

@@ -9,6 +9,7 @@
 
 #include "equipoise/actuate/safety.hpp"
 #include "equipoise/config.hpp"
+#include "equipoise/no_copy.hpp"
 #include "equipoise/overrides.hpp"
 #include "equipoise/plant/ticked_world.hpp"
 #include "equipoise/runtime/record.hpp"
@@ -22,12 +23,8 @@ using equipoise::Choice;
 using equipoise::fidelity_level;
 
 /// A simulated robot and its surroundings.
-class World : public SimulatedDevices {
+class World : public SimulatedDevices, NoCopy {
  public:
-  World() = default;
-  World(const World&) = delete;
-  World& operator=(const World&) = delete;
-
   /// No packets of the attitude source, where nobody reads them.
   virtual void without_attitude() noexcept = 0;
   /// With the dimensions that the firmware is configured with.
@@ -35,11 +32,8 @@ class World : public SimulatedDevices {
 };
 
 /// One configured pipeline.
-class Firmware {
+class Firmware : NoCopy {
  public:
-  Firmware() = default;
-  Firmware(const Firmware&) = delete;
-  Firmware& operator=(const Firmware&) = delete;
   virtual ~Firmware() = default;
 
   /// Everything of the tick but its number, its timing and the truth.
@@ -66,11 +60,8 @@ struct Retuning {
 };
 
 /// A robot's configuration as it was read.
-class ConfiguredRobot {
+class ConfiguredRobot : NoCopy {
  public:
-  ConfiguredRobot() = default;
-  ConfiguredRobot(const ConfiguredRobot&) = delete;
-  ConfiguredRobot& operator=(const ConfiguredRobot&) = delete;
   virtual ~ConfiguredRobot() = default;
 
   virtual std::unique_ptr<Firmware> firmware(const Choice& choice) const = 0;
