@@ -39,12 +39,7 @@ StandSetup mip_setup() {
 
 std::vector<WheelFinding> pulses(const StandSetup& setup, SimulatedStand& robot) {
   ManualDrive manual(robot.io(), robot.ask());
-  std::vector<WheelFinding> findings;
-  for (int i = 0; i < setup.layout.wheels; ++i)
-    findings.push_back(pulse(manual, setup.layout, setup.calibration, i));
-  refuse_wrong_azimuth(setup.layout, findings);
-  settle(manual, setup.layout, &findings);
-  return findings;
+  return pulse_all(manual, setup.layout, setup.calibration);
 }
 
 std::string complaint_with(const StandSetup& setup, const std::vector<std::string>& faults) {

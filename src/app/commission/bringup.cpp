@@ -37,17 +37,13 @@ void refuse_ill_machine(const Commissioning& commissioning, const std::string& b
   }
 }
 
-std::vector<WheelFinding> pulse_all(Commissioning& commissioning) {
+std::vector<WheelFinding> pulse_wheels(Commissioning& commissioning) {
   const auto manual = commissioning.open();
   manual->ask({Request::kUpright,
                "hang the robot up by its head or lay it on soft foam, wheels free; they will turn a little. "
                "Then press Enter"});
-  std::vector<WheelFinding> findings;
-  findings.reserve(static_cast<std::size_t>(commissioning.layout().wheels));
-  for (int i = 0; i < commissioning.layout().wheels; ++i)
-    findings.push_back(pulse(*manual, commissioning.layout(), commissioning.calibration(), i));
-  refuse_wrong_azimuth(commissioning.layout(), findings);
-  settle(*manual, commissioning.layout(), &findings);
+  std::vector<WheelFinding> findings =
+      pulse_all(*manual, commissioning.layout(), commissioning.calibration());
   for (const WheelFinding& f : findings) say("  " + describe(f));
   return findings;
 }
@@ -81,7 +77,7 @@ int run_bringup(const BringupArguments& a) {
   const CalibrationFile calibration = measure_gyro(commissioning);
 
   say("3 of 4: motors, encoders, wheels");
-  const std::vector<WheelFinding> findings = pulse_all(commissioning);
+  const std::vector<WheelFinding> findings = pulse_wheels(commissioning);
   const std::string wrong = complaint(findings);
   const std::string text =
       with_calibration(rewired(read_text(a.commissioning.board), findings), calibration_name);
@@ -89,7 +85,7 @@ int run_bringup(const BringupArguments& a) {
   if (!wrong.empty()) {
     say("  corrected: " + wrong + "; 4 of 4: again, with the corrected board file");
     commissioning.change_board(corrected);
-    const std::string still_wrong = complaint(pulse_all(commissioning));
+    const std::string still_wrong = complaint(pulse_wheels(commissioning));
     if (!still_wrong.empty())
       throw JobError("after the correction: " + still_wrong + "; nothing was written");
   }

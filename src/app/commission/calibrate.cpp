@@ -127,12 +127,8 @@ Result calibrate_mount(Commissioning& commissioning, CalibrationFile* file, nloh
 Result calibrate_motors(Commissioning& commissioning, CalibrationFile* file, nlohmann::json* json) {
   const auto manual = commissioning.open();
   const double temperature = manual->hold_still(0.1).temperature_degC;
-  std::vector<WheelFinding> findings;
-  findings.reserve(static_cast<std::size_t>(commissioning.layout().wheels));
-  for (int i = 0; i < commissioning.layout().wheels; ++i)
-    findings.push_back(pulse(*manual, commissioning.layout(), commissioning.calibration(), i));
-  refuse_wrong_azimuth(commissioning.layout(), findings);
-  settle(*manual, commissioning.layout(), &findings);
+  const std::vector<WheelFinding> findings =
+      pulse_all(*manual, commissioning.layout(), commissioning.calibration());
   Result result;
   CalibrationFile::Motors motors{stamp_of(temperature), {}, {}, {}};
   (*json)["motors"] = nlohmann::json::array();

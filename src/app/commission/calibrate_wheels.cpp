@@ -181,6 +181,55 @@ void judge(const WheelLayout& layout, const Kick& kick, WheelFinding* finding) {
   if (layout.told_apart_by_gyro()) finding->wheel = wheel;
 }
 
+/// JobError when the axes that the gyro felt are turned about the vertical against the configured ones: no
+/// board file can mend that.
+void refuse_wrong_azimuth(const WheelLayout& layout, const std::vector<WheelFinding>& findings) {
+  if (layout.wheels != 3 || !layout.told_apart_by_gyro()) return;
+  Mat3 configured, felt;
+  for (int i = 0; i < layout.wheels; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!findings[k].axis_B) return;
+    configured.col(i) = -layout.axis_B[k];  // the ball's, as wheel_order has them
+    felt.col(i) = -*findings[k].axis_B;
+  }
+  constexpr double kTurned_rad = 20.0 * kPi / 180.0;
+  const WheelOrder order = wheel_order(configured, felt);
+  if (std::abs(order.azimuth_rad) > kTurned_rad)
+    throw JobError("the wheels do not sit as the configuration says" + order.mistake +
+                   "; nothing was written");
+}
+
+/// For every motor: where `findings` leave a question, the person answers it.
+void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFinding>* findings) {
+  for (WheelFinding& f : *findings) {
+    if (f.wheel && f.turns_backwards) continue;
+    std::string question = format("motor %d moved encoder %d", f.motor + 1, f.encoder + 1);
+    question += f.wheel ? "" : "; which turned, " + layout.name(0) + " to " + layout.name(layout.wheels - 1);
+    question += f.turns_backwards ? ", first forwards or backwards (already felt; f)"
+                                  : ", and which way first: forwards or backwards (f, b)";
+    const std::string answer = manual.ask(
+        {Request::kLookAtWheel, question + "? e.g. \"" + std::to_string(f.motor + 1) + " f\"", f.motor});
+    int wheel = 0;
+    char way = 0;
+    if (std::sscanf(answer.c_str(), "%d %c", &wheel, &way) != 2 || wheel < 1 || wheel > layout.wheels ||
+        (way != 'f' && way != 'b')) {
+      throw JobError("\"" + answer + "\" is no answer like \"1 f\"; nothing was written");
+    }
+    if (!f.wheel) f.wheel = wheel - 1;
+    if (!f.turns_backwards) f.turns_backwards = way == 'b';
+  }
+  std::vector<bool> turned(static_cast<std::size_t>(layout.wheels)), counted(turned);
+  for (const WheelFinding& f : *findings) {
+    if (turned[static_cast<std::size_t>(*f.wheel)])
+      throw JobError(
+          format("two motors seem to turn wheel %d; hang the robot up freely and try again", *f.wheel + 1));
+    if (counted[static_cast<std::size_t>(f.encoder)])
+      throw JobError(format("two motors move encoder %d: a motor plug sits twice, or an encoder is missing",
+                            f.encoder + 1));
+    turned[static_cast<std::size_t>(*f.wheel)] = counted[static_cast<std::size_t>(f.encoder)] = true;
+  }
+}
+
 }  // namespace
 
 bool WheelLayout::told_apart_by_gyro() const {
@@ -233,50 +282,13 @@ WheelFinding pulse(ManualDrive& manual, const WheelLayout& layout, const Calibra
   return finding;
 }
 
-void refuse_wrong_azimuth(const WheelLayout& layout, const std::vector<WheelFinding>& findings) {
-  if (layout.wheels != 3 || !layout.told_apart_by_gyro()) return;
-  Mat3 configured, felt;
-  for (int i = 0; i < layout.wheels; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (!findings[k].axis_B) return;
-    configured.col(i) = -layout.axis_B[k];  // the ball's, as wheel_order has them
-    felt.col(i) = -*findings[k].axis_B;
-  }
-  constexpr double kTurned_rad = 20.0 * kPi / 180.0;
-  const WheelOrder order = wheel_order(configured, felt);
-  if (std::abs(order.azimuth_rad) > kTurned_rad)
-    throw JobError("the wheels do not sit as the configuration says" + order.mistake +
-                   "; nothing was written");
-}
-
-void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFinding>* findings) {
-  for (WheelFinding& f : *findings) {
-    if (f.wheel && f.turns_backwards) continue;
-    std::string question = format("motor %d moved encoder %d", f.motor + 1, f.encoder + 1);
-    question += f.wheel ? "" : "; which turned, " + layout.name(0) + " to " + layout.name(layout.wheels - 1);
-    question += f.turns_backwards ? ", first forwards or backwards (already felt; f)"
-                                  : ", and which way first: forwards or backwards (f, b)";
-    const std::string answer = manual.ask(
-        {Request::kLookAtWheel, question + "? e.g. \"" + std::to_string(f.motor + 1) + " f\"", f.motor});
-    int wheel = 0;
-    char way = 0;
-    if (std::sscanf(answer.c_str(), "%d %c", &wheel, &way) != 2 || wheel < 1 || wheel > layout.wheels ||
-        (way != 'f' && way != 'b')) {
-      throw JobError("\"" + answer + "\" is no answer like \"1 f\"; nothing was written");
-    }
-    if (!f.wheel) f.wheel = wheel - 1;
-    if (!f.turns_backwards) f.turns_backwards = way == 'b';
-  }
-  std::vector<bool> turned(static_cast<std::size_t>(layout.wheels)), counted(turned);
-  for (const WheelFinding& f : *findings) {
-    if (turned[static_cast<std::size_t>(*f.wheel)])
-      throw JobError(
-          format("two motors seem to turn wheel %d; hang the robot up freely and try again", *f.wheel + 1));
-    if (counted[static_cast<std::size_t>(f.encoder)])
-      throw JobError(format("two motors move encoder %d: a motor plug sits twice, or an encoder is missing",
-                            f.encoder + 1));
-    turned[static_cast<std::size_t>(*f.wheel)] = counted[static_cast<std::size_t>(f.encoder)] = true;
-  }
+std::vector<WheelFinding> pulse_all(ManualDrive& manual, const WheelLayout& layout,
+                                    const Calibration& calibration) {
+  std::vector<WheelFinding> findings;
+  for (int i = 0; i < layout.wheels; ++i) findings.push_back(pulse(manual, layout, calibration, i));
+  refuse_wrong_azimuth(layout, findings);
+  settle(manual, layout, &findings);
+  return findings;
 }
 
 std::string describe(const WheelFinding& f) {

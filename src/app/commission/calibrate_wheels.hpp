@@ -52,12 +52,10 @@ struct WheelFinding {
 /// JobError when nothing moves, several wheels move, or the robot does.
 WheelFinding pulse(ManualDrive& manual, const WheelLayout& layout, const Calibration& calibration, int motor);
 
-/// JobError when the axes that the gyro felt are turned about the vertical against the configured ones: no
-/// board file can mend that.
-void refuse_wrong_azimuth(const WheelLayout& layout, const std::vector<WheelFinding>& findings);
-
-/// For every motor: where `findings` leave a question, the person answers it.
-void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFinding>* findings);
+/// Of every motor; where the gyro leaves a question, the person answers it. JobError also when the axes that
+/// it felt are turned about the vertical against the configured ones: no board file can mend that.
+std::vector<WheelFinding> pulse_all(ManualDrive& manual, const WheelLayout& layout,
+                                    const Calibration& calibration);
 
 /// In words, one line per motor.
 std::string describe(const WheelFinding& finding);
