@@ -32,7 +32,6 @@ struct MipShadowModel {
     m << x.theta, x.phi, x.psi, x.theta_dot, x.phi_dot, x.psi_dot;
     return m;
   }
-  static Vec2 disturbance(const MipEkf& f) { return f.x().segment<2>(MipEkfModel::kDisturbance); }
   static Vec2 tilt(const Motion& m) { return {m(0), 0.0}; }
   static Vec2 rolled(const Motion& m) { return {m(1), 0.0}; }
   static Vec2 rolling_rate(const Motion& m) { return {m(4), 0.0}; }
@@ -62,7 +61,6 @@ struct MbbrShadowModel {
     m.tail<2>() = x.phi_dot_star;
     return m;
   }
-  static Vec3 disturbance(const MbbrEkf& f) { return f.x().segment<3>(MbbrEkfModel::kDisturbance); }
   static Vec2 tilt(const Motion& m) { return m.head<2>(); }
   static Vec2 rolled(const Motion& m) { return m.segment<2>(MbbrEkfModel::kE) - m.head<2>(); }
   static Vec2 rolling_rate(const Motion& m) { return Observable::encoder_rate_B(m).head<2>(); }
@@ -203,7 +201,7 @@ class ShadowRun {
     judged_[k] = true;
     out_.judged_s += kTickS;
     estimates_[k] = {Model::start(t.x_hat, pipeline_->estimators().ekf()),
-                     Model::disturbance(pipeline_->estimators().ekf()), seeded_at_};
+                     pipeline_->estimators().ekf().disturbance(), seeded_at_};
     const auto& nis = pipeline_->estimators().ekf().row_nis();
     for (std::size_t i = 0; i < nis.size(); ++i)
       if (nis[i] > 0.0) out_.nis[Model::kRows[i]].add(nis[i]);

@@ -115,10 +115,15 @@ class MbbrEkf {
   void allow_slip(double sigma_rad) noexcept { filter_.widen(Model::kE, 3, sigma_rad * sigma_rad); }
 
   static constexpr int kBiases = 2;  // of the gyro, that it estimates
+  Vec<kBiases> gyro_biases() const noexcept { return filter_.x().segment<kBiases>(Model::kBiasX); }
   double gyro_bias(int axis) const noexcept { return filter_.x()(Model::kBiasX + axis); }
   /// The gyro's bias is known to so much less.
   void doubt_bias(double sigma_rad_s) noexcept { filter_.widen(Model::kBiasX, 2, sigma_rad_s * sigma_rad_s); }
 
+  /// What start() takes of a tilt.
+  static const Vec2& lean(const Vec2& tilt_rad) noexcept { return tilt_rad; }
+  /// Of u, as estimated.
+  Vec3 disturbance() const noexcept { return filter_.x().segment<3>(Model::kDisturbance); }
   const Vec<18>& x() const noexcept { return filter_.x(); }
   Mat<18, 18> P() const noexcept { return filter_.P(); }
   /// gyro x, y, z, wheels, accelerometer x, y: squared innovation over its variance; 0 where not used.

@@ -34,25 +34,18 @@ double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * kPi);
 }  // namespace
 
 MbbrEstimators::MbbrEstimators(const Params& params)
-    : params_(params),
-      kinematics_(params.robot),
-      ekf_(params.robot, params.ekf),
-      faults_(ekf_, sensor_faults(params)),
+    : FaultTolerant(params, sensor_faults(params)),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()
                               : MbbrLinearModel(params.robot, params.kf_yaw_transport),
-          params.kf) {
-  ekf_.let_encoders_slip(!params.detection);  // else the detector judges what an encoder does to the filter
-}
+          params.kf) {}
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);
   const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
 
-  ekf_.start(tilt, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
-  faults_.reset(ekf_, rest_bias_.noise_rad_s().norm() / std::sqrt(3.0));
-  bias_drift_.reset(ekf_.x().segment<2>(MbbrEkfModel::kBiasX));
+  start_filter(tilt, z);
   turned_lately_rad_s_ = 0.0;
 
   Vec<13> x13 = Vec<13>::Zero();
@@ -79,60 +72,38 @@ void MbbrEstimators::start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_
                                   const Mbbr::Sample& z) noexcept {
   rest_bias_.tell(gyro_bias_B_rad_s);
   start(z);
-  ekf_.start_moving(tilt_rad, gyro_bias_B_rad_s, z);
-  bias_drift_.reset(ekf_.x().segment<2>(MbbrEkfModel::kBiasX));
-  estimates_[index(Id::kEkf)] = ekf_.estimate();
+  start_filter_moving(tilt_rad, gyro_bias_B_rad_s, z);
 }
 
 /// Heading and inertial ball angles, [T] (6.3)-(6.4).
 void MbbrEstimators::integrate(Id id, double heading_rate) noexcept {
-  MbbrEstimate& x = estimates_[index(id)];
+  MbbrEstimate& x = at(id);
   x.phi += kTickS * rotate(x.theta_z, x.phi_dot_star);
   x.theta_z += kTickS * heading_rate;
 }
 
-EstimatorHealth<Mbbr::kWheels> MbbrEstimators::health() const noexcept {
-  EstimatorHealth<Mbbr::kWheels> h;
-  if (params_.active != Id::kEkf) return h;
-  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
-  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
-  h.predicts_wheels = true;
-  h.gyro_bias_known = rest_bias_.known();
-  if (!params_.detection) return h;
-  report(faults_, &h);
-  if (faults_.suspects()) return h;  // a fault may explain what the filter has made of it: a bias, a torque
-  h.bias_drift_rad_s = bias_drift_.distance();
-  h.disturbance = ekf_.x().segment<3>(MbbrEkfModel::kDisturbance).norm();
-  return h;
+void MbbrEstimators::step_ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
+  MbbrEstimate& x = at(Id::kEkf);
+  step_filter(z, u, x.omega_B);
+  if (params_.detection) watch_bias(x.omega_B.z());
+  x = ekf_.estimate();
 }
 
-void MbbrEstimators::ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
-  MbbrEstimate& x = estimates_[index(Id::kEkf)];
-  if (!params_.detection) {
-    ekf_.predict(u);
-    ekf_.update(z);
-    x = ekf_.estimate();
-    return;
-  }
-  const int jumps = faults_.bias_jumps();
-  faults_.step(ekf_, u, z, x.omega_B);
-  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(bias_drift_.kFoundAnew_rad_s);
-  // What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
-  const double turns_rad_s = x.omega_B.z();
+/// What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
+void MbbrEstimators::watch_bias(double turns_rad_s) noexcept {
   turned_lately_rad_s_ += kTickS / kLately_s * (turns_rad_s - turned_lately_rad_s_);
-  bias_drift_.update(ekf_.x().segment<2>(MbbrEkfModel::kBiasX), kMountError_rad * std::abs(turns_rad_s),
+  bias_drift_.update(ekf_.gyro_biases(), kMountError_rad * std::abs(turns_rad_s),
                      kSuddenTurn_rad * std::abs(turns_rad_s - turned_lately_rad_s_));
-  x = ekf_.estimate();
 }
 
 const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept {
   if (held) {
     start(z);
-    return estimates_[index(params_.active)];
+    return at(params_.active);
   }
-  if (runs(Id::kEkf)) ekf(z, u);
+  if (runs(Id::kEkf)) step_ekf(z, u);
   if (runs_published()) published(z, u);
-  return estimates_[index(params_.active)];
+  return at(params_.active);
 }
 
 /// The filters of [T] and the linear one.
@@ -145,7 +116,7 @@ void MbbrEstimators::published(const Mbbr::Sample& z, const Vec3& u) noexcept {
   const std::array<bool, 8> use{i, i, i, e, e, e, i, i};
 
   const auto from_13 = [this](Id id, const Vec<13>& x, double nis) {
-    MbbrEstimate& out = estimates_[index(id)];
+    MbbrEstimate& out = at(id);
     integrate(id, 0.0);
     out.theta_xy = x.head<2>();
     out.theta_z = x(MbbrPublishedModel::kThetaZ);
@@ -169,7 +140,7 @@ void MbbrEstimators::published(const Mbbr::Sample& z, const Vec3& u) noexcept {
     y6 << z.gyro_B_rad_s.head<2>(), phi_B.head<2>(), z.accel_B_m_s2.head<2>();
     step(kf_, Vec3(u.x(), u.y(), z.gyro_B_rad_s.z()), y6, std::array<bool, 6>{i, i, e, e, i, i});
     const Vec<8>& x = kf_.x();
-    MbbrEstimate& out = estimates_[index(Id::kKfAttitude)];
+    MbbrEstimate& out = at(Id::kKfAttitude);
     if (z.attitude_ok) {
       integrate(Id::kKfAttitude, wrapped(z.attitude_rad.z() - attitude_heading_) / kTickS);
       out.theta_xy = z.attitude_rad.head<2>();

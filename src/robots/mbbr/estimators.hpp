@@ -7,12 +7,8 @@
 
 #include <array>
 
-#include "equipoise/estimate/health.hpp"
 #include "equipoise/estimate/kalman.hpp"
-#include "equipoise/estimate/rest_bias.hpp"
-#include "equipoise/estimate/rest_tilt.hpp"
-#include "equipoise/estimate/sensor_faults.hpp"
-#include "equipoise/estimate/slow_drift.hpp"
+#include "robots/common/fault_tolerant.hpp"
 #include "robots/mbbr/ekf.hpp"
 #include "robots/mbbr/high_yaw.hpp"
 #include "robots/mbbr/mbbr.hpp"
@@ -39,17 +35,9 @@ struct MbbrEstimatorParams {
 };
 
 /// Runs the active estimator, or all of them.
-class MbbrEstimators {
+class MbbrEstimators : public FaultTolerant<Mbbr, MbbrEkf, MbbrEstimatorParams, kMbbrEstimatorNames> {
  public:
-  using Id = MbbrEstimatorId;
-  using Params = MbbrEstimatorParams;
-  static constexpr std::size_t kCount = kMbbrEstimatorNames.size();
-  static constexpr const auto& kNames = kMbbrEstimatorNames;
-
   explicit MbbrEstimators(const Params& params);
-
-  /// Simulation only: what `truth` returns from now on.
-  void observe_truth(const MbbrEstimate& truth) noexcept { estimates_[index(Id::kTruth)] = truth; }
 
   /// `held`: motors off, the robot is not balancing.
   const MbbrEstimate& update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept;
@@ -57,40 +45,22 @@ class MbbrEstimators {
   /// The default filter of a robot that moves already; tilt and bias from elsewhere.
   void start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_rad_s, const Mbbr::Sample& z) noexcept;
 
-  bool runs(Id id) const noexcept { return id == params_.active || params_.compare; }
-  const MbbrEstimate& estimate(Id id) const noexcept { return estimates_[index(id)]; }
-  /// The default filter: rows, variances, predicted wheel rates.
-  const MbbrEkf& ekf() const noexcept { return ekf_; }
-  /// Of the active estimator; only the default filter tells.
-  EstimatorHealth<Mbbr::kWheels> health() const noexcept;
-  /// It finds a faulty encoder by itself.
-  bool isolates() const noexcept { return params_.active == Id::kEkf; }
-  /// Default filters that run: the control's, and those that look for faults; see sensor_faults.hpp.
-  int filters() const noexcept { return params_.detection ? static_cast<int>(faults_.kCount) + 2 : 1; }
   bool reads_attitude() const noexcept { return runs(Id::kKfAttitude); }
 
  private:
-  static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
   void start(const Mbbr::Sample& z) noexcept;
   bool runs_published() const noexcept {
     return runs(Id::kEkf13Published) || runs(Id::kEkf13) || runs(Id::kKfAttitude);
   }
   void published(const Mbbr::Sample& z, const Vec3& u) noexcept;
-  void ekf(const Mbbr::Sample& z, const Vec3& u) noexcept;
+  void step_ekf(const Mbbr::Sample& z, const Vec3& u) noexcept;
+  void watch_bias(double turns_rad_s) noexcept;
   void integrate(Id id, double heading_rate) noexcept;
 
-  Params params_;
-  MbbrKinematics kinematics_;
-  MbbrEkf ekf_;
-  SensorFaults<MbbrEkf, Mbbr::kWheels> faults_;
-  SlowDrift<2> bias_drift_;
   double turned_lately_rad_s_ = 0.0;  // about z
   KalmanFilter<MbbrPublishedModel> ekf13_published_;
   KalmanFilter<MbbrModel13> ekf13_;
   KalmanFilter<MbbrLinearModel> kf_;
-  RestTilt rest_tilt_;
-  RestBias rest_bias_;
-  std::array<MbbrEstimate, kCount> estimates_{};
   double attitude_heading_ = 0.0;  // continuous heading of the attitude source
 };
 

@@ -119,6 +119,7 @@ class MipEkf {
   void allow_slip(double sigma_rad) noexcept { filter_.widen(Model::kPhi, 2, sigma_rad * sigma_rad); }
 
   static constexpr int kBiases = 1;  // of the gyro, that it estimates
+  Vec<kBiases> gyro_biases() const noexcept { return filter_.x().segment<kBiases>(Model::kGyroBias); }
   double gyro_bias(int axis) const noexcept { return filter_.x()(Model::kGyroBias + axis); }
   /// A wheel's encoder may turn alone: encoder_slip.hpp. Its faults then leave no trace but innovations.
   void let_encoders_slip(bool slip) noexcept { encoders_slip_ = slip; }
@@ -127,6 +128,10 @@ class MipEkf {
     filter_.widen(Model::kGyroBias, 1, sigma_rad_s * sigma_rad_s);
   }
 
+  /// What start() takes of a tilt.
+  static double lean(const Vec2& tilt_rad) noexcept { return tilt_rad.x(); }
+  /// Of u, as estimated.
+  Vec2 disturbance() const noexcept { return filter_.x().segment<2>(Model::kDisturbance); }
   const Vec<14>& x() const noexcept { return filter_.x(); }
   Mat<14, 14> P() const noexcept { return filter_.P(); }
   /// gyro x, y, z, wheels, accelerometer y: squared innovation over its variance; 0 where not used.

@@ -18,18 +18,14 @@ SensorFaultsParams sensor_faults(const MipEstimatorParams& params) {
 }  // namespace
 
 MipEstimators::MipEstimators(const Params& params)
-    : params_(params),
-      kinematics_(params.robot),
+    : FaultTolerant(params, sensor_faults(params)),
       complementary_kf_(MipInclinometerModel{}, params.complementary_kf),
       planar_kf_(MipPlanarModel(params.robot), params.planar_kf),
-      ekf_(params.robot, params.ekf),
-      faults_(ekf_, sensor_faults(params)),
-      ekf_published_(MipPublishedModel{}, params.ekf_published) {
-  ekf_.let_encoders_slip(!params.detection);  // else the detector judges what an encoder does to the filter
-}
+      ekf_published_(MipPublishedModel{}, params.ekf_published) {}
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {
-  const double lean = rest_tilt_.update(z.accel_B_m_s2).x();
+  const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);
+  const double lean = tilt.x();
   const double phi = kinematics_.phi(z.wheel_angle_rad);
   heading_ = kinematics_.psi(z.wheel_angle_rad);
   gyro_previous_ = z.gyro_B_rad_s.x();
@@ -37,9 +33,7 @@ void MipEstimators::start(const Mip::Sample& z) noexcept {
 
   complementary_kf_.reset({lean, 0.0});
   planar_kf_.reset({lean, phi, 0.0, 0.0});
-  ekf_.start(lean, rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
-  faults_.reset(ekf_, rest_bias_.noise_rad_s().norm() / std::sqrt(3.0));
-  bias_drift_.reset(ekf_.x().segment<1>(MipEkfModel::kGyroBias));
+  start_filter(tilt, z);
   Vec<6> x6 = Vec<6>::Zero();
   x6.head<3>() << lean, phi, heading_;
   ekf_published_.reset(x6);
@@ -62,13 +56,11 @@ void MipEstimators::start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_r
                                  const Mip::Sample& z) noexcept {
   rest_bias_.tell(gyro_bias_B_rad_s);
   start(z);
-  ekf_.start_moving(tilt_rad.x(), gyro_bias_B_rad_s, z);
-  bias_drift_.reset(ekf_.x().segment<1>(MipEkfModel::kGyroBias));
-  estimates_[index(Id::kEkf)] = ekf_.estimate();
+  start_filter_moving(tilt_rad, gyro_bias_B_rad_s, z);
 }
 
 void MipEstimators::from_wheels_and_gyro(Id id, const Mip::Sample& z) noexcept {
-  MipEstimate& x = estimates_[index(id)];
+  MipEstimate& x = at(id);
   if (z.encoders_ok) {
     x.phi = kinematics_.phi(z.wheel_angle_rad);
     x.phi_dot = kinematics_.phi(z.wheel_rate_rad_s);
@@ -81,12 +73,12 @@ void MipEstimators::from_wheels_and_gyro(Id id, const Mip::Sample& z) noexcept {
 }
 
 void MipEstimators::move(Id id) noexcept {
-  MipEstimate& x = estimates_[index(id)];
+  MipEstimate& x = at(id);
   x.position_W_m += kTickS * rotate(x.psi, Vec2(0.0, axle_speed(params_.robot, x)));
 }
 
 void MipEstimators::complementary(const Mip::Sample& z) noexcept {
-  MipEstimate& x = estimates_[index(Id::kComplementary)];
+  MipEstimate& x = at(Id::kComplementary);
   const double c = params_.complementary_weight;
   x.theta = c * x.theta + kTickS * gyro_previous_ + (1.0 - c) * inclination_previous_;  // (3.29)
   from_wheels_and_gyro(Id::kComplementary, z);
@@ -97,7 +89,7 @@ void MipEstimators::complementary_kf(const Mip::Sample& z) noexcept {
   const Vec<1> gyro = Vec<1>::Constant(gyro_previous_);
   complementary_kf_.predict(gyro);
   complementary_kf_.update(gyro, Vec<1>::Constant(accel_inclination(z.accel_B_m_s2)), {z.imu_ok});
-  MipEstimate& x = estimates_[index(Id::kComplementaryKf)];
+  MipEstimate& x = at(Id::kComplementaryKf);
   x.theta = complementary_kf_.x()(0);
   x.normalized_innovation = complementary_kf_.normalized_innovation();
   from_wheels_and_gyro(Id::kComplementaryKf, z);
@@ -110,7 +102,7 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
   planar_kf_.update(u_x, {kinematics_.phi(z.wheel_angle_rad), z.gyro_B_rad_s.x(), z.accel_B_m_s2.y()},
                     {z.encoders_ok, z.imu_ok, z.imu_ok});
   from_wheels_and_gyro(Id::kPlanarKf, z);
-  MipEstimate& x = estimates_[index(Id::kPlanarKf)];
+  MipEstimate& x = at(Id::kPlanarKf);
   const Vec<4>& state = planar_kf_.x();
   x.theta = state(0);
   x.phi = state(1);
@@ -120,21 +112,10 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
   move(Id::kPlanarKf);
 }
 
-void MipEstimators::ekf(const Mip::Sample& z, const Vec2& u) noexcept {
-  MipEstimate& x = estimates_[index(Id::kEkf)];
-  if (!params_.detection) {
-    ekf_.predict(u);
-    ekf_.update(z);
-    const Vec2 before = x.position_W_m;
-    x = ekf_.estimate();
-    x.position_W_m = before;
-    move(Id::kEkf);
-    return;
-  }
-  const int jumps = faults_.bias_jumps();
-  faults_.step(ekf_, u, z, body_rates(x));
-  if (faults_.bias_jumps() != jumps) bias_drift_.excuse(bias_drift_.kFoundAnew_rad_s);
-  bias_drift_.update(ekf_.x().segment<1>(MipEkfModel::kGyroBias), 0.0, 0.0);
+void MipEstimators::step_ekf(const Mip::Sample& z, const Vec2& u) noexcept {
+  MipEstimate& x = at(Id::kEkf);
+  step_filter(z, u, body_rates(x));
+  if (params_.detection) bias_drift_.update(ekf_.gyro_biases(), 0.0, 0.0);
   const Vec2 position = x.position_W_m;
   x = ekf_.estimate();
   x.position_W_m = position;
@@ -149,7 +130,7 @@ void MipEstimators::ekf_published(const Mip::Sample& z, const Vec2& u) noexcept 
                         {kinematics_.phi(z.wheel_angle_rad), z.gyro_B_rad_s.x(), z.accel_B_m_s2.y(),
                          kinematics_.psi(z.wheel_angle_rad)},
                         {e, i, i, e});
-  MipEstimate& x = estimates_[index(Id::kEkfPublished)];
+  MipEstimate& x = at(Id::kEkfPublished);
   const Vec<6>& state = ekf_published_.x();
   x.theta = state(MipPublishedModel::kTheta);
   x.phi = state(MipPublishedModel::kPhi);
@@ -162,7 +143,7 @@ void MipEstimators::ekf_published(const Mip::Sample& z, const Vec2& u) noexcept 
 }
 
 void MipEstimators::attitude(const Mip::Sample& z) noexcept {
-  MipEstimate& x = estimates_[index(Id::kAttitude)];
+  MipEstimate& x = at(Id::kAttitude);
   if (z.attitude_ok) {
     x.theta = z.attitude_rad.x();
   } else if (z.imu_ok) {
@@ -172,25 +153,10 @@ void MipEstimators::attitude(const Mip::Sample& z) noexcept {
   move(Id::kAttitude);
 }
 
-EstimatorHealth<Mip::kWheels> MipEstimators::health() const noexcept {
-  EstimatorHealth<Mip::kWheels> h;
-  if (params_.active != Id::kEkf) return h;
-  h.tilt_sigma_rad = ekf_.tilt_sigma_rad();
-  h.wheel_rate_rad_s = ekf_.wheel_rate_rad_s();
-  h.predicts_wheels = true;
-  h.gyro_bias_known = rest_bias_.known();
-  if (!params_.detection) return h;
-  report(faults_, &h);
-  if (faults_.suspects()) return h;  // a fault may explain what the filter has made of it: a bias, a torque
-  h.bias_drift_rad_s = bias_drift_.distance();
-  h.disturbance = ekf_.x().segment<2>(MipEkfModel::kDisturbance).norm();
-  return h;
-}
-
 const MipEstimate& MipEstimators::update(const Mip::Sample& z, const Vec2& u, bool held) noexcept {
   if (held) {
     start(z);
-    return estimates_[index(params_.active)];
+    return at(params_.active);
   }
   if (z.imu_ok) heading_ += kTickS * z.gyro_B_rad_s.z();
   if (z.encoders_ok) {
@@ -199,14 +165,14 @@ const MipEstimate& MipEstimators::update(const Mip::Sample& z, const Vec2& u, bo
   if (runs(Id::kComplementary)) complementary(z);
   if (runs(Id::kComplementaryKf)) complementary_kf(z);
   if (runs(Id::kPlanarKf)) planar_kf(z, u);
-  if (runs(Id::kEkf)) ekf(z, u);
+  if (runs(Id::kEkf)) step_ekf(z, u);
   if (runs(Id::kEkfPublished)) ekf_published(z, u);
   if (runs(Id::kAttitude)) attitude(z);
   if (z.imu_ok) {
     gyro_previous_ = z.gyro_B_rad_s.x();
     if (runs(Id::kComplementary)) inclination_previous_ = accel_inclination(z.accel_B_m_s2);
   }
-  return estimates_[index(params_.active)];
+  return at(params_.active);
 }
 
 }  // namespace equipoise
