@@ -57,7 +57,7 @@ RawSample EngineBody::sense(const Vec<kMaxMotors>& wheel_angle_rad, double batte
   now.omega_B_rad_s = motion_.omega_B_rad_s;
   now.specific_force_B_m_s2 =
       held_ ? Vec3(motion_.R_WB.transpose() * Vec3(0.0, 0.0, kGravity_m_s2)) : motion_.specific_force_B_m_s2;
-  std::copy(wheel_angle_rad.begin(), wheel_angle_rad.end(), now.wheel_angle_rad.begin());
+  now.wheel_angle_rad = wheel_angle_rad;
   now.battery_V = battery_V;
   return sensors_.sense(now);
 }

@@ -94,15 +94,12 @@ RawSample SimulatedSensors::sense(const TrueMotion& m) {
 
 /// The motion with each sensor's own age.
 TrueMotion SimulatedSensors::as_felt(const TrueMotion& m) noexcept {
-  Felt now{m.time_s, m.omega_B_rad_s, m.specific_force_B_m_s2,
-           Eigen::Map<const Vec<kMaxMotors>>(m.wheel_angle_rad.data())};
-  past_.add(now);
+  past_.add(m);
   TrueMotion felt = m;
   const double imu_at_s = world_.imu_repeat_share > 0.0 ? imu_sample_ * imu_period_s() : m.time_s;
   felt.omega_B_rad_s = past_.value(imu_at_s - world_.gyro_age_s(), &Felt::omega_B_rad_s);
   felt.specific_force_B_m_s2 = past_.value(imu_at_s - world_.accel_age_s(), &Felt::specific_force_B_m_s2);
-  const Vec<kMaxMotors> wheels = past_.value(m.time_s - world_.encoder_sample_age_s, &Felt::wheel_angle_rad);
-  std::copy(wheels.begin(), wheels.end(), felt.wheel_angle_rad.begin());
+  felt.wheel_angle_rad = past_.value(m.time_s - world_.encoder_sample_age_s, &Felt::wheel_angle_rad);
   return felt;
 }
 
@@ -148,7 +145,7 @@ RawSample SimulatedSensors::sense_now(const TrueMotion& m) {
     raw.accel_counts[k] = imu_counts(accel_S(i), calibration_.accel_m_s2_per_count);
   }
   for (std::size_t k = 0; k < wheels_; ++k) {
-    double angle = m.wheel_angle_rad[k];
+    double angle = m.wheel_angle_rad(static_cast<int>(k));
     if (encoder_noisy_) angle += encoder_noise_.gaussian(world_.encoder_sigma_rad);
     raw.encoder_counts[k] =
         counts(calibration_.encoder_sign[k] * angle, 2.0 * kPi / calibration_.encoder_counts_per_rev);

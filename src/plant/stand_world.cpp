@@ -57,9 +57,10 @@ RawSample StandWorld::sense() {
   // The chip's axes are stretched; the calibration's bias and scale are undone by the sensors.
   const Vec3 force_S = calibration_.R_BS.transpose() * force_B;
   m.specific_force_B_m_s2 = calibration_.R_BS * force_S.cwiseProduct(Vec3::Ones() + stand_.accel_scale_error);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(stand_.wheels); ++i) {
-    const auto wheel = static_cast<std::size_t>(stand_.wiring.wheel_of_encoder[i]);
-    m.wheel_angle_rad[i] = stand_.wiring.encoder_sign[i] * angle_[wheel];
+  for (int i = 0; i < stand_.wheels; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const auto wheel = static_cast<std::size_t>(stand_.wiring.wheel_of_encoder[k]);
+    m.wheel_angle_rad(i) = stand_.wiring.encoder_sign[k] * angle_[wheel];
   }
   m.battery_V = motors_.battery_V();
   return sensors_.sense(m);

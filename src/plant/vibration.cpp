@@ -40,11 +40,11 @@ Vibration::Vibration(const VibrationParams& p, std::uint64_t seed, std::size_t w
   }
 }
 
-Vibration::Shaken Vibration::update(double time_s, const std::array<double, kMaxMotors>& wheel_angle_rad) {
+Vibration::Shaken Vibration::update(double time_s, const Vec<kMaxMotors>& wheel_angle_rad) {
   double rate_rad_s = 0.0;
   Vec<4 * kMaxMotors> phases = Vec<4 * kMaxMotors>::Zero();
   for (std::size_t wheel = 0; wheel < wheels_; ++wheel) {
-    const double angle = wheel_angle_rad[wheel];
+    const double angle = wheel_angle_rad(static_cast<int>(wheel));
     if (time_s_ >= 0.0 && time_s > time_s_)
       rate_rad_s += std::abs(angle - angle_rad_[wheel]) / ((time_s - time_s_) * static_cast<double>(wheels_));
     angle_rad_[wheel] = angle;

@@ -14,8 +14,8 @@ namespace equipoise {
 struct Felt {
   double time_s = 0.0;
   Vec3 omega_B_rad_s = Vec3::Zero();
-  Vec3 specific_force_B_m_s2 = Vec3::Zero();
-  Vec<kMaxMotors> wheel_angle_rad = Vec<kMaxMotors>::Zero();
+  Vec3 specific_force_B_m_s2 = Vec3::Zero();                  // at the IMU
+  Vec<kMaxMotors> wheel_angle_rad = Vec<kMaxMotors>::Zero();  // relative to the body
 };
 
 class DelayLine {

@@ -20,12 +20,8 @@ std::array<double, 4> quaternion_of(const Vec3& theta_rad);
 /// By a rotation vector.
 Mat3 turned_by(const Vec3& rotation_rad) noexcept;
 
-struct TrueMotion {
-  double time_s = 0.0;
+struct TrueMotion : Felt {
   Vec3 theta_rad = Vec3::Zero();  // roll, pitch, continuous yaw
-  Vec3 omega_B_rad_s = Vec3::Zero();
-  Vec3 specific_force_B_m_s2 = Vec3::Zero();         // at the IMU
-  std::array<double, kMaxMotors> wheel_angle_rad{};  // relative to the body
   double battery_V = 0.0;
 };
 

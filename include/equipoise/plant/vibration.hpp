@@ -34,7 +34,7 @@ class Vibration {
   struct Shaken {
     Vec3 gyro_rad_s, accel_m_s2;
   };
-  Shaken update(double time_s, const std::array<double, kMaxMotors>& wheel_angle_rad);
+  Shaken update(double time_s, const Vec<kMaxMotors>& wheel_angle_rad);
 
  private:
   using Vec6 = Vec<6>;

@@ -333,18 +333,11 @@ Felt MbbrWorld::felt_now() const noexcept {
 }
 
 RawSample MbbrWorld::sense() {
-  TrueMotion now;
-  now.time_s = time_s_;
-  now.theta_rad = s_.segment<3>(kTheta);
-  const Felt here = felt_now();
-  now.omega_B_rad_s = here.omega_B_rad_s;
-  now.specific_force_B_m_s2 = here.specific_force_B_m_s2;
+  TrueMotion now{felt_now(), s_.segment<3>(kTheta), motors_.battery_V()};
   if (held_) {
     now.specific_force_B_m_s2 =
         rotation(quaternion_of(now.theta_rad)).transpose() * Vec3(0.0, 0.0, kGravity_m_s2);
   }
-  for (int i = 0; i < 3; ++i) now.wheel_angle_rad[static_cast<std::size_t>(i)] = here.wheel_angle_rad(i);
-  now.battery_V = motors_.battery_V();
   return sensors_.sense(now);
 }
 

@@ -200,15 +200,8 @@ RawSample MipWorld::sense() {
   const Facing facing(at);
   const Vec2 friction =
       friction_torque<double>(now_, Body{*this}, at, facing, gear, friction_limit(rates), common_.step_s);
-  const Felt here = felt(accelerations(at, facing, gear + friction));
-  TrueMotion m;
-  m.time_s = time_s_;
-  m.theta_rad << s()(kTheta), 0.0, s()(kPsi);
-  m.omega_B_rad_s = here.omega_B_rad_s;
-  m.specific_force_B_m_s2 = here.specific_force_B_m_s2;
-  m.wheel_angle_rad = {here.wheel_angle_rad(0), here.wheel_angle_rad(1)};
-  m.battery_V = motors_.battery_V();
-  return sensors_.sense(m);
+  return sensors_.sense({felt(accelerations(at, facing, gear + friction)), Vec3(s()(kTheta), 0.0, s()(kPsi)),
+                         motors_.battery_V()});
 }
 
 MipEstimate MipWorld::truth() const noexcept {
