@@ -48,12 +48,7 @@ struct MbbrAccess {
   }
   static MbbrEstimate estimate(const StateView& v, const MbbrParameters&) {
     MbbrEstimate x;
-    x.theta_xy = v.theta_rad.head<2>();
-    x.theta_z = v.theta_rad.z();
-    x.omega_B = v.omega_B_rad_s;
-    x.theta_dot = euler_rates(x.theta_xy, x.omega_B);
-    x.phi_dot_star = v.phi_dot_rad_s;
-    x.phi = v.phi_rad;
+    (void)recall(v, &x);
     x.normalized_innovation = v.normalized_innovation;
     return x;
   }

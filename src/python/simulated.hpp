@@ -148,7 +148,7 @@ class SimulatedOf : public Simulated {
   }
 
   void calibrate(const std::string& toml, const std::vector<RawSample>& raw, double* out) const override {
-    const Calibration calibration = Firmware::parse(toml, "the log").config.calibration;
+    const Calibration calibration = Firmware::parse(toml, "the log", {}).config.calibration;
     for (const RawSample& sample : raw) {
       const auto z = equipoise::calibrate<Robot::kWheels>(sample, calibration);
       for (const Vec3& v : {z.gyro_B_rad_s, z.accel_B_m_s2, z.attitude_rad}) {

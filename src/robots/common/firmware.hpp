@@ -2,8 +2,6 @@
 // its list entry. Start-up only.
 #pragma once
 
-#include <string>
-
 #include "robots/common/choice.hpp"
 
 namespace equipoise {

@@ -23,13 +23,8 @@ struct MbbrFirmware : FirmwareBase<Mbbr, MbbrConfig, MbbrWorld> {
   static constexpr bool kDrivesSideways = true;
   static constexpr double kForward_rad = 0.0;  // heading of a drive forward at yaw 0, from x
 
-  static Loaded load(const std::string& path, const Overrides& overrides) {
-    return load_mbbr(path, overrides);
-  }
-  static Loaded parse(const std::string& text, const std::string& origin,
-                      const std::vector<std::string>& set = {}) {
-    return parse_mbbr(text, origin, set);
-  }
+  static constexpr auto load = load_mbbr;
+  static constexpr auto parse = parse_mbbr;
   static std::vector<std::string> estimators() {
     return {kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end()};
   }

@@ -23,13 +23,8 @@ struct MipFirmware : FirmwareBase<Mip, MipConfig, MipWorld> {
   static constexpr bool kDrivesSideways = false;
   static constexpr double kForward_rad = -0.5 * kPi;  // heading of a drive forward at yaw 0, from x
 
-  static Loaded load(const std::string& path, const Overrides& overrides) {
-    return load_mip(path, overrides);
-  }
-  static Loaded parse(const std::string& text, const std::string& origin,
-                      const std::vector<std::string>& set = {}) {
-    return parse_mip(text, origin, set);
-  }
+  static constexpr auto load = load_mip;
+  static constexpr auto parse = parse_mip;
   static std::vector<std::string> estimators() {
     return {kMipEstimatorNames.begin(), kMipEstimatorNames.end()};
   }
