@@ -123,19 +123,29 @@ class SettledControllerOf : public SettledController {
   double heading_ = 0.0;
 };
 
+/// Of four states; what no sensor says of them is zero.
+Plant plant_of(const CMatrix& A, const CMatrix& b, const Chain& chain) {
+  Plant plant;
+  plant.A = A;
+  plant.b = b;
+  plant.actuation_delay_s = chain.actuation_delay_s;
+  for (SensorRow& row : plant.sensors) row.C = Eigen::RowVectorXcd::Zero(4);
+  plant.sensors[kGyro].delay_s = plant.sensors[kGyroAcross].delay_s = chain.gyro_delay_s;
+  plant.sensors[kAccel].delay_s = chain.accel_delay_s;
+  plant.sensors[kAttitude].delay_s = chain.attitude_delay_s;
+  return plant;
+}
+
 /// States: tilt z, encoder angle q, body rate w, ball rate v, each x + i y; q' = v - w, [T] (5.31).
 Plant mbbr_plant(const MbbrParameters& p, double yaw_rate_rad_s, const Chain& chain) {
   enum State : int { kZ, kQ, kW, kV };
   const MbbrLinear linear = mbbr_linear(p, yaw_rate_rad_s);
-  Plant plant;
-  plant.A = linear.A;  // row and column of the ball angle give way to the encoders'
+  Plant plant = plant_of(linear.A, linear.b, chain);  // the ball angle gives way to the encoders'
   plant.A.col(kQ).setZero();
   plant.A.row(kQ).setZero();
   plant.A(kQ, kV) = 1.0;
   plant.A(kQ, kW) = -1.0;
-  plant.b = linear.b;
   plant.drift = std::polar(1.0, -yaw_rate_rad_s * kTickS);
-  plant.actuation_delay_s = chain.actuation_delay_s;
 
   MbbrHighYaw::State x = MbbrHighYaw::State::Zero();
   x(MbbrHighYaw::kThetaDotZ) = yaw_rate_rad_s;
@@ -151,18 +161,14 @@ Plant mbbr_plant(const MbbrParameters& p, double yaw_rate_rad_s, const Chain& ch
   const Complex z = of(MbbrHighYaw::kThetaX);
   const Complex z_dot = of(MbbrHighYaw::kThetaDotX);
 
-  for (SensorRow& row : plant.sensors) row.C = Eigen::RowVectorXcd::Zero(4);
   plant.sensors[kGyro].C(kW) = 1.0;
-  plant.sensors[kGyro].delay_s = chain.gyro_delay_s;
   plant.sensors[kEncoder].C(kQ) = 1.0;
   SensorRow& accel = plant.sensors[kAccel];
   accel.C(kZ) = z - Complex(0.0, yaw_rate_rad_s) * z_dot;  // z' = w - i theta_z' z
   accel.C(kW) = z_dot;
   accel.C(kV) = of(MbbrHighYaw::kPhiDotX);
   accel.D = Complex((driven - y)(3), (driven - y)(4));
-  accel.delay_s = chain.accel_delay_s;
   plant.sensors[kAttitude].C(kZ) = 1.0;
-  plant.sensors[kAttitude].delay_s = chain.attitude_delay_s;
   return plant;
 }
 
@@ -170,22 +176,14 @@ Plant mbbr_plant(const MbbrParameters& p, double yaw_rate_rad_s, const Chain& ch
 Plant mip_plant(const MipParameters& p, double yaw_rate_rad_s, const Chain& chain) {
   const MipLinear linear = mip_linear(p, yaw_rate_rad_s);
   const MipCoefficients c = mip_coefficients(p, p.l_a.y(), p.l_a.z());
-  Plant plant;
-  plant.A = linear.A;
-  plant.b = linear.b;
-  plant.actuation_delay_s = chain.actuation_delay_s;
-  for (SensorRow& row : plant.sensors) row.C = Eigen::RowVectorXcd::Zero(4);
+  Plant plant = plant_of(linear.A, linear.b, chain);
   plant.sensors[kGyro].C(2) = 1.0;
-  plant.sensors[kGyro].delay_s = chain.gyro_delay_s;
   plant.sensors[kGyroAcross].C(0) = yaw_rate_rad_s;  // turning, a tilted body turns about its y too
-  plant.sensors[kGyroAcross].delay_s = chain.gyro_delay_s;
   plant.sensors[kEncoder].C(1) = 1.0;
   plant.sensors[kAccel].C(0) = c.accel_y_th + c.accel_y_th_dps2 * yaw_rate_rad_s * yaw_rate_rad_s;
   plant.sensors[kAccel].C(3) = c.accel_y_dph;
   plant.sensors[kAccel].D = c.accel_y_ux;
-  plant.sensors[kAccel].delay_s = chain.accel_delay_s;
   plant.sensors[kAttitude].C(0) = 1.0;
-  plant.sensors[kAttitude].delay_s = chain.attitude_delay_s;
   return plant;
 }
 
