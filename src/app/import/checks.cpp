@@ -1,10 +1,9 @@
 #include "app/import/checks.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
-#include "app/import/regression.hpp"
 #include "app/import/signals.hpp"
 #include "app/import/table_checks.hpp"
 #include "app/import/wheel_order.hpp"
@@ -12,6 +11,14 @@
 
 namespace equipoise::app {
 namespace {
+
+/// Of a least squares fit, with its standard error.
+struct Coefficient {
+  double value = 0.0;
+  double sigma = 0.0;
+  /// It differs from zero by three sigma.
+  bool known() const { return std::abs(value) > 3.0 * sigma; }
+};
 
 constexpr double kRightOfForce = 5.0;  // what the specific force says of small motions, shaken as it is
 
@@ -60,19 +67,31 @@ struct Grid {
 
   /// In the balancing band, of the ticks that count.
   Series part(const Series& x) const {
-    const Series band = Band()(x);
+    const Series band = balancing(x);
     Series out;
     for (std::size_t k = 0; k < band.size(); ++k)
       if (used[k]) out.push_back(band[k]);
     return out;
   }
+  /// y = sum c_i x_i; degrees of freedom by bandwidth, two a second and Hz.
   std::vector<Coefficient> fit(const std::vector<Series>& x, const Series& y) const {
-    std::vector<Series> parts;
-    parts.reserve(x.size());
-    for (const Series& each : x) parts.push_back(part(each));
-    const Series target = part(y);
-    const double seconds = kTickS * static_cast<double>(target.size());
-    return regression(parts, target, 2.0 * (kHigh_Hz - kLow_Hz) * seconds);
+    const auto column = [this](const Series& of) {
+      const Series counted = part(of);
+      return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(counted.data(), Eigen::Index(counted.size())));
+    };
+    const Eigen::VectorXd Y = column(y);
+    Eigen::MatrixXd X(Y.size(), Eigen::Index(x.size()));
+    for (std::size_t i = 0; i < x.size(); ++i) X.col(Eigen::Index(i)) = column(x[i]);
+    const Eigen::FullPivLU<Eigen::MatrixXd> lu(X.transpose() * X);
+    if (!lu.isInvertible()) return std::vector<Coefficient>(x.size(), {0.0, INFINITY});
+    const Eigen::MatrixXd inverse = lu.inverse();
+    const Eigen::VectorXd c = inverse * (X.transpose() * Y);
+    const double independent = 2.0 * (kHigh_Hz - kLow_Hz) * (kTickS * static_cast<double>(Y.size()));
+    const double freedom = std::max(independent - static_cast<double>(x.size()), 1.0);
+    const double variance = (Y - X * c).squaredNorm() / freedom;
+    std::vector<Coefficient> out;
+    for (Eigen::Index i = 0; i < c.size(); ++i) out.push_back({c(i), std::sqrt(variance * inverse(i, i))});
+    return out;
   }
 };
 
