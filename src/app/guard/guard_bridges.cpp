@@ -16,8 +16,6 @@ int open_attribute(const std::string& path) {
   return fd;
 }
 
-int write_number(int fd, std::uint64_t value) noexcept { return sysfs_write_u64(fd, value); }
-
 }  // namespace
 
 BoardBridges::BoardBridges(const bbb_config_t& config) {
@@ -36,12 +34,12 @@ FileBridges::~FileBridges() {
   for (const int fd : pwm_fds_) close(fd);
 }
 
-int FileBridges::enable() noexcept { return enable_fd_ >= 0 ? write_number(enable_fd_, 1) : 0; }
+int FileBridges::enable() noexcept { return enable_fd_ >= 0 ? sysfs_write_u64(enable_fd_, 1) : 0; }
 
 int FileBridges::off() noexcept {
-  int status = enable_fd_ >= 0 ? write_number(enable_fd_, 0) : 0;
+  int status = enable_fd_ >= 0 ? sysfs_write_u64(enable_fd_, 0) : 0;
   for (const int fd : pwm_fds_) {
-    const int next = write_number(fd, 0);
+    const int next = sysfs_write_u64(fd, 0);
     if (status == 0) status = next;
   }
   return status;
