@@ -1,6 +1,5 @@
 // What runs when: interrupt threads, CPU frequency, and the watchdog for a kernel that runs nothing any more.
 #include <algorithm>
-#include <array>
 #include <climits>
 #include <filesystem>
 #include <sstream>
