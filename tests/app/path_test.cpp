@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -75,6 +77,39 @@ TEST_P(NamedPath, ARobotThatMovesAlongItsNoseFollowsIt) {
     heading += turn;
     ASSERT_LT((position - path->at(t + kTickS).position_W_m).norm(), 2e-3) << t;
   }
+}
+
+/// Left, right, lowest and highest of its points.
+std::array<double, 4> extent(const char* name) {
+  const auto path = make_path(name, kSpeed_m_s, kAnything);
+  std::array<double, 4> e{};
+  for (double t = 0.0; t < 60.0; t += 0.01) {
+    const Vec2 p = path->at(t).position_W_m;
+    e = {std::min(e[0], p.x()), std::max(e[1], p.x()), std::min(e[2], p.y()), std::max(e[3], p.y())};
+  }
+  return e;
+}
+
+TEST(NamedPaths, AreAsLargeAsTheReferenceSays) {
+  for (const char* round : {"circle", "waltz"}) {
+    const auto [left, right, low, high] = extent(round);
+    EXPECT_NEAR(left, -0.3, 1e-3) << round;
+    EXPECT_NEAR(right, 0.3, 1e-3);
+    EXPECT_NEAR(low, 0.0, 1e-9);
+    EXPECT_NEAR(high, 0.6, 1e-3);
+  }
+  const auto [left, right, low, high] = extent("square");
+  EXPECT_NEAR(right - left, 0.6, 1e-3);
+  EXPECT_NEAR(left, -0.15, 1e-3) << "it begins behind a corner of 0.15 m";
+  EXPECT_NEAR(low, 0.0, 1e-9);
+  EXPECT_NEAR(high, 0.6, 1e-3);
+  double farthest = 0.0;
+  const auto eight = make_path("figure8", kSpeed_m_s, kAnything);
+  for (double t = 0.0; t < 60.0; t += 0.01) {
+    const Vec2 p = rotate(kPi / 4.0, eight->at(t).position_W_m);
+    farthest = std::max(farthest, std::abs(p.x()));
+  }
+  EXPECT_NEAR(farthest, 0.4, 1e-3) << "half its width";
 }
 
 TEST(WaypointPath, IsTheClampedCubicSpline) {

@@ -55,6 +55,17 @@ TEST(Margins, OfAnUnstablePlantSayHowFarTheGainMayFall) {
   EXPECT_TRUE(std::isinf(m.gain_up_dB));
 }
 
+TEST(Margins, OfThreeLagsSayHowFarTheGainMayRise) {
+  // L = 2 / (s + 1)^3: -1/4 at w = sqrt(3); of size one at w^2 = 2^(2/3) - 1, three times atan(w) late.
+  const Margins m = of([](double w) { return 2.0 / std::pow(kJ * w + 1.0, 3.0); });
+  EXPECT_NEAR(m.gain_up_dB, 20.0 * std::log10(4.0), 1e-3);
+  EXPECT_TRUE(std::isinf(m.gain_down_dB)) << m.gain_down_dB;
+  const double w = std::sqrt(std::cbrt(4.0) - 1.0);
+  const double phase_rad = 2.0 * kHalfPi - 3.0 * std::atan(w);
+  EXPECT_NEAR(m.phase_deg, phase_rad * 90.0 / kHalfPi, 0.01);
+  EXPECT_NEAR(m.delay_s, phase_rad / w, 1e-4);
+}
+
 TEST(Margins, OfAnIntegratorFillHalfThePlane) {
   // |1 + L| = |1 - L| where L is imaginary.
   EXPECT_NEAR(of([](double w) { return 10.0 / (kJ * w); }).disk, 2.0, 1e-9);
