@@ -285,6 +285,7 @@ WheelFinding pulse(ManualDrive& manual, const WheelLayout& layout, const Calibra
 std::vector<WheelFinding> pulse_all(ManualDrive& manual, const WheelLayout& layout,
                                     const Calibration& calibration) {
   std::vector<WheelFinding> findings;
+  findings.reserve(static_cast<std::size_t>(layout.wheels));
   for (int i = 0; i < layout.wheels; ++i) findings.push_back(pulse(manual, layout, calibration, i));
   refuse_wrong_azimuth(layout, findings);
   settle(manual, layout, &findings);
