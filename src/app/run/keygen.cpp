@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "app/cli/commands.hpp"
+#include "equipoise/runtime/command_key.hpp"
 
 namespace equipoise::app {
 

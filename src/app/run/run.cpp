@@ -13,6 +13,7 @@
 #include "app/text/files.hpp"
 #include "bbb.h"
 #include "config/population.hpp"
+#include "equipoise/runtime/command_key.hpp"
 
 namespace equipoise::app {
 namespace {

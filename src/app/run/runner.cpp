@@ -21,6 +21,7 @@
 #include "app/run/run_arguments.hpp"
 #include "app/run/status_indicator.hpp"
 #include "app/run/wires.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"
