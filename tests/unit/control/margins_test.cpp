@@ -108,6 +108,13 @@ TEST(Margins, TheCurveIsNotFollowedThroughZeroAndTheCentre) {
   }
 }
 
+TEST(Margins, AJumpFromTheFarSideIsNoCrossing) {
+  EXPECT_TRUE(std::isinf(
+      margins({1.0, 2.0}, {-std::polar(2.0, 2.0), -std::polar(2.0, -1.0)}, 0.0, 0.0).gain_down_dB));
+  EXPECT_FALSE(std::isinf(
+      margins({1.0, 2.0}, {-std::polar(2.0, 1.0), -std::polar(2.0, -1.0)}, 0.0, 0.0).gain_down_dB));
+}
+
 TEST(Margins, TheWorseOfTwoIsTheWorseInEach) {
   const Margins a{6.0, -3.0, 40.0, 0.01, 1.0};
   const Margins b{5.0, -4.0, 50.0, 0.02, 0.5};
