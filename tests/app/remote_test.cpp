@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <mutex>
@@ -291,6 +292,16 @@ TEST_F(EventRemote, SilenceIsLettingGo) {
   while (hand.heard && std::chrono::steady_clock::now() < end) hand = device.look(5);
   EXPECT_FALSE(hand.heard);
   EXPECT_EQ(hand.forward, 0.0);
+}
+
+TEST_F(EventRemote, KeysAloneNeedNoRange) {
+  file_.axis_range.reset();
+  file_.events.erase(std::remove_if(file_.events.begin(), file_.events.end(),
+                                    [](const EventBinding& binding) { return binding.axis; }),
+                     file_.events.end());
+  EventDevice device(file_);
+  put(EV_KEY, KEY_W, 1);
+  EXPECT_EQ(device.look(100).forward, 1.0);
 }
 
 TEST_F(EventRemote, WithoutARangeItSaysWhatToWrite) {
