@@ -16,22 +16,31 @@ static void sleep_until(int64_t deadline_ns) {
   }
 }
 
+/* The IMU's next sample: its interrupt, or scans. As gpio_wait_edge. */
+static int wait_sample(bbb_t* bbb, int64_t deadline_ns, int64_t* edge_ns) {
+  return bbb->iio.devices > 0 ? iio_imu_wait(&bbb->iio, deadline_ns, edge_ns)
+                              : gpio_wait_edge(&bbb->ready, deadline_ns, edge_ns);
+}
+
 static int wait_tick(void* self, int64_t* now_ns) {
   bbb_t* bbb = self;
   const int64_t due_ns = bbb->tick_ns + bbb->period_ns;
   int64_t edge_ns = 0;
-  const int edges = gpio_wait_edge(&bbb->ready, due_ns + bbb->late_after_ns, &edge_ns);
+  if (bbb->own_pace) sleep_until(due_ns);
+  const int edges = wait_sample(bbb, due_ns + bbb->late_after_ns, &edge_ns);
   bbb->late = edges <= 0;
-  if (edges > 0) {
+  bbb->imu_gone = edges < 0 && bbb->iio.devices > 0;
+  if (edges > 0 && !bbb->own_pace) {
     bbb->tick_ns = edge_ns;
     bbb->sample_ns = edge_ns;
     bbb->status.missed_edges += (uint32_t)(edges - 1);
   } else {
-    ++bbb->status.late_ticks;
+    if (bbb->late) ++bbb->status.late_ticks;
     if (edges < 0) sleep_until(due_ns); /* a line that fails at once must not turn the loop into a spin */
     /* Keep the rhythm, but do not queue up ticks behind a stall. */
     const int64_t present_ns = monotonic_ns();
     bbb->tick_ns = present_ns - due_ns > bbb->period_ns ? present_ns : due_ns;
+    if (!bbb->late) bbb->sample_ns = bbb->tick_ns;
   }
   *now_ns = monotonic_ns();
   return 0;
@@ -40,9 +49,30 @@ static int wait_tick(void* self, int64_t* now_ns) {
 /* --- sensors
  * ------------------------------------------------------------------------------------------------- */
 
+static void read_iio(bbb_t* bbb, rio_sensors_t* out) {
+  iio_imu_sample_t sample;
+  if (iio_imu_read(&bbb->iio, &sample) < 0) {
+    out->health |= RIO_IMU_LATE; /* this tick's is taken already */
+    return;
+  }
+  memcpy(out->gyro_counts, sample.gyro_counts, sizeof out->gyro_counts);
+  memcpy(out->accel_counts, sample.accel_counts, sizeof out->accel_counts);
+  out->imu_temperature_degC = sample.temperature_degC;
+  if (sample.clipped) out->health |= RIO_IMU_CLIPPED;
+  if (sample.stuck) {
+    out->health |= RIO_IMU_STUCK;
+    return;
+  }
+  out->valid |= RIO_IMU;
+}
+
 static void read_imu(bbb_t* bbb, rio_sensors_t* out) {
   if (bbb->late) {
-    out->health |= RIO_IMU_LATE;
+    out->health |= bbb->imu_gone ? RIO_IMU_BUS_ERROR : RIO_IMU_LATE;
+    return;
+  }
+  if (bbb->iio.devices > 0) {
+    read_iio(bbb, out);
     return;
   }
   mpu9250_sample_t sample;
@@ -194,6 +224,7 @@ void bbb_close(void* self) {
   if (gpio_is_open(&bbb->enable)) gpio_close(&bbb->enable);
   if (gpio_is_open(&bbb->ready)) gpio_close(&bbb->ready);
   adc_close(&bbb->battery);
+  iio_imu_close(&bbb->iio);
   mpu9250_close(&bbb->imu);
   free(bbb);
 }

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "equipoise/imu_parts.h"
 #include "robot_io.h"
 
 #ifdef __cplusplus
@@ -36,13 +37,18 @@ typedef struct bbb_motor {
   bool encoder_reversed;
 } bbb_motor_t;
 
+enum bbb_imu_driver { BBB_IMU_MPU9250, BBB_IMU_IIO };
+
 typedef struct bbb_imu {
-  char bus[BBB_NAME_MAX]; /* "/dev/i2c-2" */
+  enum bbb_imu_driver driver;
+  int part;                   /* of equipoise/imu_parts.h */
+  char trigger[BBB_NAME_MAX]; /* IIO; empty: the kernel driver's own */
+  char bus[BBB_NAME_MAX];     /* "/dev/i2c-2" */
   uint16_t address;
   uint16_t rate_hz; /* the loop's rate */
   uint16_t gyro_range_dps;
   uint16_t accel_range_g;
-  uint8_t dlpf;                    /* 1 .. 6 */
+  uint8_t dlpf;                    /* setting of the part's low pass, 1 .. 6 */
   uint16_t stuck_after;            /* samples; 0: never */
   bbb_pin_t interrupt;             /* active_low: falling edge */
   uint32_t late_after_us;          /* the tick comes this long after a missing edge */

@@ -29,12 +29,15 @@ static const char* hint(int code) {
   }
 }
 
-int bbb_fail(bbb_error_t* error, int code, const char* what, const char* device) {
+int bbb_explain(bbb_error_t* error, int code, const char* what, const char* device, const char* advice) {
   if (error == NULL) return code;
   error->code = code;
   const char* name = strerrorname_np(-code);
-  const char* advice = hint(code);
   snprintf(error->text, sizeof error->text, "%s: %s: %s (%s)%s%s", what, device, strerror(-code),
            name == NULL ? "?" : name, advice == NULL ? "" : ": ", advice == NULL ? "" : advice);
   return code;
+}
+
+int bbb_fail(bbb_error_t* error, int code, const char* what, const char* device) {
+  return bbb_explain(error, code, what, device, hint(code));
 }

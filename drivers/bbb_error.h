@@ -7,5 +7,6 @@
 
 /* Returns `code`. `what` and `device` name the part and its path or address. */
 int bbb_fail(bbb_error_t* error, int code, const char* what, const char* device);
+int bbb_explain(bbb_error_t* error, int code, const char* what, const char* device, const char* advice);
 
 #endif

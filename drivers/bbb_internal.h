@@ -6,6 +6,7 @@
 #include "bbb.h"
 #include "dmp.h"
 #include "eqep.h"
+#include "iio_imu.h"
 #include "mc33926.h"
 #include "mpu9250.h"
 #include "tb6612.h"
@@ -23,6 +24,8 @@ typedef struct bbb_wheel {
 
 typedef struct bbb {
   mpu9250_t imu;
+  iio_imu_t iio; /* in its place */
+  bool own_pace; /* ticks by our clock: the IMU's rate is another */
   dmp_t dmp;
   bool has_dmp;
   double gyro_scale; /* to the boundary's counts: 16.4 per deg/s, 4096 per g */
@@ -33,6 +36,7 @@ typedef struct bbb {
   int64_t tick_ns; /* the last tick, or when it was due */
   int64_t sample_ns;
   bool late;
+  bool imu_gone;
   bbb_wheel_t wheel[RIO_MAX_MOTORS];
   uint32_t wheels;
   gpio_line_t enable;

@@ -65,7 +65,23 @@ static int open_encoder(bbb_t* bbb, const bbb_config_t* config, uint32_t index, 
   return status < 0 ? bbb_fail(error, status, what, config->motor[index].encoder) : 0;
 }
 
+static int open_iio(bbb_t* bbb, const bbb_imu_t* config, bbb_error_t* error) {
+  const iio_imu_config_t imu = {.part = config->part,
+                                .low_pass = config->dlpf,
+                                .gyro_range_dps = config->gyro_range_dps,
+                                .accel_range_g = config->accel_range_g,
+                                .stuck_after = config->stuck_after,
+                                .stale_after_ns = bbb->period_ns + bbb->late_after_ns,
+                                .trigger = config->trigger};
+  iio_fault_t fault;
+  const int status = iio_imu_open(&bbb->iio, &imu, &fault);
+  if (status < 0) return bbb_explain(error, status, "imu", fault.where, fault.advice);
+  bbb->own_pace = imu_low_pass(config->part, config->dlpf)->rate_hz != config->rate_hz;
+  return 0;
+}
+
 static int open_imu(bbb_t* bbb, const bbb_imu_t* config, bbb_error_t* error) {
+  if (config->driver == BBB_IMU_IIO) return open_iio(bbb, config, error);
   const mpu9250_config_t imu = {.bus = config->bus,
                                 .address = config->address,
                                 .rate_hz = config->rate_hz,
@@ -101,6 +117,7 @@ static int open_dmp(bbb_t* bbb, const bbb_imu_t* config, bbb_error_t* error) {
 }
 
 static int open_ready(bbb_t* bbb, const bbb_imu_t* config, bbb_error_t* error) {
+  if (config->driver == BBB_IMU_IIO) return 0; /* its buffer wakes the loop */
   const gpio_pin_t pin = pin_of(&config->interrupt);
   const int status =
       gpio_open_edge(&bbb->ready, &pin, config->interrupt.active_low ? GPIO_FALLING : GPIO_RISING);
@@ -119,7 +136,8 @@ static int check_config(const bbb_config_t* config, bbb_error_t* error) {
     return bbb_fail(error, -EINVAL, "board", "motors");
   if (config->pwm_hz < 100 || config->pwm_hz > 100000) return bbb_fail(error, -EINVAL, "board", "pwm_hz");
   if (config->imu.rate_hz == 0) return bbb_fail(error, -EINVAL, "board", "imu rate_hz");
-  if (!config->imu.interrupt.used) return bbb_fail(error, -EINVAL, "board", "imu interrupt");
+  if (config->imu.driver == BBB_IMU_MPU9250 && !config->imu.interrupt.used)
+    return bbb_fail(error, -EINVAL, "board", "imu interrupt");
   if (config->battery_every_ticks == 0) return bbb_fail(error, -EINVAL, "board", "battery_every_ticks");
   return 0;
 }

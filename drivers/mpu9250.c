@@ -65,7 +65,7 @@ static int check_config(const mpu9250_config_t* config) {
 int mpu9250_open(mpu9250_t* imu, const mpu9250_config_t* config) {
   memset(imu, 0, sizeof *imu);
   imu->i2c.fd = -1;
-  imu->stuck_after = config->stuck_after;
+  imu->repeats.stuck_after = config->stuck_after;
   int status = check_config(config);
   if (status == 0) status = i2c_dev_open(&imu->i2c, config->bus, config->address);
   if (status < 0) return status;
@@ -84,21 +84,13 @@ int mpu9250_read(mpu9250_t* imu, mpu9250_sample_t* out) {
   if (status < 0) return status;
   out->flags = 0;
   out->temperature = big_endian(bytes + 6);
+  int32_t axes[6]; /* without the temperature, which may stand still */
   for (size_t i = 0; i < 3; ++i) {
-    out->accel[i] = big_endian(bytes + 2 * i);
-    out->gyro[i] = big_endian(bytes + 8 + 2 * i);
+    axes[i] = out->accel[i] = big_endian(bytes + 2 * i);
+    axes[3 + i] = out->gyro[i] = big_endian(bytes + 8 + 2 * i);
     if (at_range_end(out->accel[i]) || at_range_end(out->gyro[i])) out->flags |= MPU9250_CLIPPED;
   }
-  uint8_t axes[12]; /* without the temperature, which may stand still */
-  memcpy(axes, bytes, 6);
-  memcpy(axes + 6, bytes + 8, 6);
-  if (memcmp(axes, imu->last, sizeof axes) != 0) {
-    imu->repeats = 0;
-    memcpy(imu->last, axes, sizeof axes);
-  } else if (imu->repeats < UINT16_MAX) {
-    ++imu->repeats;
-  }
-  if (imu->stuck_after > 0 && imu->repeats >= imu->stuck_after) out->flags |= MPU9250_STUCK;
+  if (repeats_stuck(&imu->repeats, axes)) out->flags |= MPU9250_STUCK;
   return 0;
 }
 

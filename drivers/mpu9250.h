@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "i2c_dev.h"
+#include "repeats.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -40,9 +41,7 @@ typedef struct mpu9250 {
   i2c_dev_t i2c;
   uint8_t who_am_i;
   bool variant; /* works, but is not an MPU-9250: warn */
-  uint16_t stuck_after;
-  uint16_t repeats;
-  uint8_t last[12];
+  repeats_t repeats;
 } mpu9250_t;
 
 /* Resets and configures the chip, reads every register back. -ENODEV: another chip answers; -EINVAL: bad

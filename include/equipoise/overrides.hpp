@@ -20,6 +20,8 @@ struct BoardFacts {
   double pwm_hz = 0.0;
   std::string bridge;          // drive_brake or drive_coast
   std::array<double, 9> R_BS;  // rows
+  double gyro_delay_s = 0.0;   // of the IMU's low pass
+  double accel_delay_s = 0.0;
   double battery_V_per_count = 0.0;
   double battery_offset_V = 0.0;
 };

@@ -195,6 +195,19 @@ RandomPushes read_random_pushes(Section s) {
   return p;
 }
 
+/// A part by name has its data sheet's noise, too.
+void read_imu_part(Section& s, WorldParams* w) {
+  std::vector<std::string> names{""};
+  for (int i = 0; i < IMU_PARTS; ++i) names.emplace_back(imu_part(i)->name);
+  const std::size_t named = s.choice("imu_part", names);
+  if (named == 0) return;
+  w->imu_part = static_cast<int>(named) - 1;
+  if (imu_low_pass(w->imu_part, w->imu_low_pass)->gyro_hz == 0.0)
+    s.fail("imu_part", names[named] + " has no imu_low_pass = " + std::to_string(w->imu_low_pass));
+  w->gyro_sigma_rad_s = imu_gyro_sigma_rad_s(w->imu_part, w->imu_low_pass);
+  w->accel_sigma_m_s2 = imu_accel_sigma_m_s2(w->imu_part, w->imu_low_pass);
+}
+
 void read_disturbance(Section& s, WorldParams* w) {
   w->stiction.static_ratio = s.number("static_ratio", 1.0, 5.0);
   w->stiction.rate_rad_s = s.number("stribeck_rate_rad_s", 1e-3, 100.0);
@@ -205,6 +218,7 @@ void read_disturbance(Section& s, WorldParams* w) {
   if (w->actuation_steps() >= steps) s.fail("actuation_delay_ticks", "with the latency more than a tick");
   w->sensor_latency_ticks = s.integer("sensor_latency_ticks", 0, 3);
   if (s.has("imu_low_pass")) w->imu_low_pass = s.integer("imu_low_pass", 0, IMU_LOW_PASS_MAX);
+  if (s.has("imu_part")) read_imu_part(s, w);
   w->imu_delay_scale = number_or(s, "imu_delay_scale", 1.0, 0.0, 2.0);
   w->imu_sample_age_s = number_or(s, "imu_sample_age_s", 0.0, 0.0, 0.01);
   w->encoder_sample_age_s = number_or(s, "encoder_sample_age_s", 0.0, 0.0, 0.01);

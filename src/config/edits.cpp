@@ -278,6 +278,8 @@ void check_board(const toml::table& root, const std::string& path, const BoardFa
     const std::string index = "[" + std::to_string(i) + "]";
     number("imu.R_BS" + index, board.R_BS[i], "calibration.R_BS" + index);
   }
+  number("imu.low_pass delays the gyro", board.gyro_delay_s, "chain.gyro_delay_s");
+  number("imu.low_pass delays the accelerometer", board.accel_delay_s, "chain.accel_delay_s");
   const toml::node* bridge = toml::at_path(root, "motor.bridge").node();
   if (bridge == nullptr) return;
   const auto ours = bridge->value<std::string>();

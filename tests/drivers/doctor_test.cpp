@@ -3,6 +3,7 @@
 
 #include <cerrno>
 
+#include "fake_iio.hpp"
 #include "testbed.hpp"
 
 namespace equipoise::app::doctor {
@@ -72,6 +73,23 @@ TEST_F(DoctorTest, RefusesADmpImageOfTheWrongSize) {
   const Finding finding = look("imu.dmp");
   EXPECT_EQ(finding.verdict, Verdict::kFail);
   EXPECT_NE(finding.what.find("9 bytes, not 3062"), std::string::npos);
+}
+
+TEST_F(DoctorTest, LooksForTheKernelsDeviceWhenTheBoardNamesOne) {
+  board_.wiring.imu.driver = BBB_IMU_IIO;
+  EXPECT_EQ(look("imu.gyro").verdict, Verdict::kFail);
+  EXPECT_NE(look("imu.gyro").what.find("no IIO device mpu9250"), std::string::npos);
+  EXPECT_EQ(look("imu.chip").what, "not looked at");
+  auto attributes = iio_attributes("mpu9250", {"in_accel", "in_anglvel"}, "be:s16/16>>0");
+  attributes["trigger/current_trigger"] = "";
+  const std::string dir = addDevice("iio", "2-0068/iio:device4", attributes);
+  const FakeIio node(hostPath("/dev/iio:device4"));
+  EXPECT_NE(look("imu.gyro").what.find("current_trigger is empty"), std::string::npos);
+  EXPECT_NE(look("imu.gyro").fix.find("[imu] trigger"), std::string::npos);
+  setAttribute(dir, "trigger/current_trigger", "mpu9250-dev4");
+  EXPECT_EQ(look("imu.gyro").verdict, Verdict::kOk);
+  removeAttribute(dir, "buffer");
+  EXPECT_NE(look("imu.accel").what.find("the driver has no interrupt"), std::string::npos);
 }
 
 }  // namespace

@@ -131,6 +131,16 @@ ssize_t __wrap_pread64(int fd, void* data, size_t size, off64_t at) {
   return error == 0 ? 0 : -1;
 }
 
+ssize_t __real_read(int fd, void* data, size_t size);
+
+ssize_t __wrap_read(int fd, void* data, size_t size) {
+  int error = 0;
+  if (!SyscallJournal::instance().takeFailure(SyscallJournal::Call::kRead, pathOf(fd), &error))
+    return __real_read(fd, data, size);
+  errno = error;
+  return error == 0 ? 0 : -1;
+}
+
 ssize_t __wrap_pwrite64(int fd, const void* data, size_t size, off64_t at) {
   const std::string path = pathOf(fd);
   int error = 0;

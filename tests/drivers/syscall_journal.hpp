@@ -1,6 +1,6 @@
 // What the drivers wrote, in order, which files they hold open, and system calls that fail on demand. In:
-// nothing, it listens to open, close, pread and pwrite (linked with --wrap) and to fake_gpio. Out: a journal
-// of "name=value" lines. Not thread-safe: one driver thread.
+// nothing, it listens to open, close, read, pread and pwrite (linked with --wrap) and to fake_gpio. Out: a
+// journal of "name=value" lines. Not thread-safe: one driver thread.
 #pragma once
 
 #include <functional>

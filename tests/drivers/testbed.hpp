@@ -28,6 +28,9 @@ class Testbed : public ::testing::Test {
   void addGpioNode(const std::string& name, const std::string& label);  // a node alone, which tells its label
   void addImu(int bus = 2);
   void addBoard();  // all a robot with three motors needs
+  std::string addDevice(const std::string& subsystem, const std::string& path,
+                        const std::map<std::string, std::string>& attributes);
+  std::string hostPath(const std::string& path) const;  // where it is in the temporary directory
 
   std::string attribute(const std::string& dir, const std::string& name) const;  // first line
   void setAttribute(const std::string& dir, const std::string& name, const std::string& value);
@@ -42,9 +45,6 @@ class Testbed : public ::testing::Test {
   static gboolean onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
   static gboolean onLabelIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
   void addNode(const std::string& name, const std::string& subsystem, GCallback answer);
-  std::string addDevice(const std::string& subsystem, const std::string& path,
-                        const std::map<std::string, std::string>& attributes);
-  std::string hostPath(const std::string& path) const;
 
   UMockdevTestbed* testbed_;
   std::map<std::string, UMockdevIoctlBase*> ioctl_;  // by node

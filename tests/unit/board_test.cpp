@@ -60,6 +60,54 @@ TEST(Board, MbbrHasThreeDriveCoastBridgesAtTheWiringInItsFile) {
   EXPECT_EQ(board.led_bars.size(), 4u);
 }
 
+/// The MBBR's board with an IMU of the kernel's.
+std::string iio_board(const std::string& imu) {
+  std::string text = text_of(kBoards + "robotics_cape_mbbr.toml");
+  const std::size_t begin = text.find("[imu]");
+  return text.replace(begin, text.find("[bridges]") - begin,
+                      "[imu]\ndriver = \"iio\"\nrate_hz = 200\ngyro_range_deg_s = 2000\naccel_range_g = 8\n"
+                      "stuck_after_samples = 10\nlate_after_us = 1000\nR_BS = [1, 0, 0, 0, 1, 0, 0, 0, 1]\n" +
+                          imu + "\n");
+}
+
+TEST(Board, TakesAnImuOfTheKernelsByItsPart) {
+  const Board board = parse_board(iio_board("part = \"lsm6dso\"\nlow_pass = 2\ntrigger = \"t\""), "b.toml");
+  EXPECT_EQ(board.wiring.imu.driver, BBB_IMU_IIO);
+  EXPECT_STREQ(imu_part(board.wiring.imu.part)->gyro_device, "lsm6dso_gyro");
+  EXPECT_EQ(imu_low_pass(board.wiring.imu.part, board.wiring.imu.dlpf)->rate_hz, 833);
+  EXPECT_STREQ(board.wiring.imu.trigger, "t");
+  EXPECT_EQ(board.facts.gyro_delay_s, 0.76e-3);
+}
+
+TEST(Board, RefusesALowPassThatTheKernelsDriverDoesNotSet) {
+  const auto refusal = [](const std::string& imu) {
+    const std::string text = iio_board(imu + "\n# here");
+    return complaint(text, "# here", "");
+  };
+  EXPECT_THAT(refusal("part = \"icm42688\"\nlow_pass = 4"),
+              AllOf(StartsWith("b.toml:"), HasSubstr("low_pass"), HasSubstr("1")));
+  EXPECT_THAT(refusal("part = \"mpu9250\"\nlow_pass = 3"), HasSubstr("allowed: 1 to 2"))
+      << "100 Hz: less than the loop";
+  EXPECT_THAT(refusal("part = \"adis16470\"\nlow_pass = 1"), HasSubstr("icm42688"));
+  EXPECT_THAT(refusal("part = \"bmi270\"\nlow_pass = 1\nbus = \"/dev/i2c-2\""), HasSubstr("bus"));
+  EXPECT_EQ(refusal("part = \"bmi270\"\nlow_pass = 1"), "accepted");
+}
+
+/// One delay for driver, filter and simulated world: the configuration must have the board's.
+TEST(Board, TheConfigurationHasTheDelayOfTheBoardsImu) {
+  const auto load = [](const std::string& imu) -> std::string {
+    try {
+      load_mbbr(kConfig, overrides_of(parse_board(iio_board(imu), "b.toml")));
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(load("part = \"icm42688\"\nlow_pass = 1"),
+              AllOf(HasSubstr("0.00225"), HasSubstr("chain.gyro_delay_s = 0.0039")));
+  EXPECT_EQ(load("part = \"mpu6500\"\nlow_pass = 2"), "accepted");
+}
+
 TEST(Board, MipHasTwoDriveBrakeBridgesOneReversed) {
   const Board board = load_board(kBoards + "robotics_cape_edumip.toml");
   EXPECT_EQ(board.robot, "mip");

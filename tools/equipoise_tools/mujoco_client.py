@@ -37,7 +37,7 @@ from .lockstep_client import (
 from .paths import UserError, import_lcm_types
 
 STEP = 0.0005
-# RM-MPU-9250A, low-pass register 2 (include/equipoise/imu_low_pass.h).
+# RM-MPU-9250A, low-pass register 2 (include/equipoise/imu_parts.h).
 GYRO_DELAY_S, ACCEL_DELAY_S = 3.9e-3, 2.88e-3
 GYRO_SIGMA, ACCEL_SIGMA, ENCODER_SIGMA = 0.001442, 1.187, 0.008729  # [T] (6.23)
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "equipoise/actuate/bridge.hpp"
-#include "equipoise/imu_low_pass.h"
+#include "equipoise/imu_parts.h"
 #include "equipoise/plant/coulomb.hpp"
 #include "equipoise/plant/ground.hpp"
 #include "equipoise/plant/vibration.hpp"
@@ -88,10 +88,11 @@ struct WorldParams {
   int actuation_latency_steps = 0;     // until the bridges follow
   double actuation_delay_ticks = 0.0;  // beside the latency: where in the tick the PWM takes the new duty
   int sensor_latency_ticks = 0;        // of a whole sample
-  /// Age of each sensor within its sample: the IMU's low pass by its register (0: none), and sampling
+  /// Age of each sensor within its sample: the IMU's low pass by its setting (0: none), and sampling
   /// instants.
+  int imu_part = 0;  // of equipoise/imu_parts.h
   int imu_low_pass = 0;
-  double imu_delay_scale = 1.0;  // of the register's delays
+  double imu_delay_scale = 1.0;  // of the setting's delays
   double imu_sample_age_s = 0.0;
   double encoder_sample_age_s = 0.0;
   Vec3 imu_misalignment_rad = Vec3::Zero();  // rotation vector, body axes: mount against calibration
@@ -120,11 +121,14 @@ struct WorldParams {
   bool aged() const noexcept {
     return imu_repeat_share > 0.0 || gyro_age_s() > 0.0 || accel_age_s() > 0.0 || encoder_sample_age_s > 0.0;
   }
-  double gyro_age_s() const noexcept {
-    return imu_sample_age_s + (imu_low_pass > 0 ? imu_delay_scale * imu_gyro_delay_s(imu_low_pass) : 0.0);
-  }
+  double gyro_age_s() const noexcept { return imu_sample_age_s + imu_delay_scale * gyro_delay_s(); }
   double accel_age_s() const noexcept {
-    return imu_sample_age_s + (imu_low_pass > 0 ? imu_delay_scale * imu_accel_delay_s(imu_low_pass) : 0.0);
+    return imu_sample_age_s +
+           (imu_low_pass > 0 ? imu_delay_scale * ::imu_low_pass(imu_part, imu_low_pass)->accel_delay_s : 0.0);
+  }
+  /// By the data sheet.
+  double gyro_delay_s() const noexcept {
+    return imu_low_pass > 0 ? ::imu_low_pass(imu_part, imu_low_pass)->gyro_delay_s : 0.0;
   }
   /// Coulomb friction over the configured one.
   double friction_now(double time_s) const noexcept {

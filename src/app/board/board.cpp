@@ -51,19 +51,42 @@ int read_one_of(Section& s, const std::string& key, const std::vector<int>& valu
   s.fail(key, std::to_string(value) + " is not possible; allowed: " + allowed);
 }
 
-bbb_imu_t read_imu(Section s, std::array<double, 9>* R_BS) {
+/// The part, and of its low-pass settings one that the driver can choose.
+void read_part(Section& s, bbb_imu_t* imu) {
+  const bool iio = imu->driver == BBB_IMU_IIO;
+  if (iio) {
+    std::vector<std::string> names;
+    for (int i = 0; i < IMU_PARTS; ++i) names.emplace_back(imu_part(i)->name);
+    imu->part = static_cast<int>(s.choice("part", names));
+  }
+  std::vector<int> settings;
+  for (int i = 1; i <= IMU_LOW_PASS_MAX; ++i) {
+    if (!iio || imu_low_pass(imu->part, i)->rate_hz >= imu->rate_hz) settings.push_back(i);
+  }
+  imu->dlpf = static_cast<std::uint8_t>(read_one_of(s, "low_pass", settings));
+}
+
+bbb_imu_t read_imu(Section s, BoardFacts* facts) {
   bbb_imu_t imu{};
-  copy_text(s, "bus", imu.bus, sizeof imu.bus);
-  imu.address = static_cast<std::uint16_t>(s.integer("address", 0x08, 0x77));
+  if (s.has("driver"))
+    imu.driver = s.choice("driver", {"mpu9250", "iio"}) == 0 ? BBB_IMU_MPU9250 : BBB_IMU_IIO;
   imu.rate_hz = static_cast<std::uint16_t>(s.integer("rate_hz", 200, 200));
+  read_part(s, &imu);
   imu.gyro_range_dps = static_cast<std::uint16_t>(read_one_of(s, "gyro_range_deg_s", {250, 500, 1000, 2000}));
   imu.accel_range_g = static_cast<std::uint16_t>(read_one_of(s, "accel_range_g", {2, 4, 8, 16}));
-  imu.dlpf = static_cast<std::uint8_t>(s.integer("low_pass", 1, 6));
   imu.stuck_after = static_cast<std::uint16_t>(s.integer("stuck_after_samples", 0, 1000));
-  imu.interrupt = read_pin(s, "interrupt", s.boolean("interrupt_active_low"));
   imu.late_after_us = static_cast<std::uint32_t>(s.integer("late_after_us", 1, 5000));
-  copy_text(s, "dmp_firmware", imu.dmp_firmware, sizeof imu.dmp_firmware);
-  Eigen::Map<RowMajor>(R_BS->data()) = s.rotation("R_BS");
+  if (imu.driver == BBB_IMU_IIO) {
+    if (s.has("trigger")) copy_text(s, "trigger", imu.trigger, sizeof imu.trigger);
+  } else {
+    copy_text(s, "bus", imu.bus, sizeof imu.bus);
+    imu.address = static_cast<std::uint16_t>(s.integer("address", 0x08, 0x77));
+    imu.interrupt = read_pin(s, "interrupt", s.boolean("interrupt_active_low"));
+    copy_text(s, "dmp_firmware", imu.dmp_firmware, sizeof imu.dmp_firmware);
+  }
+  Eigen::Map<RowMajor>(facts->R_BS.data()) = s.rotation("R_BS");
+  facts->gyro_delay_s = imu_low_pass(imu.part, imu.dlpf)->gyro_delay_s;
+  facts->accel_delay_s = imu_low_pass(imu.part, imu.dlpf)->accel_delay_s;
   s.finish();
   return imu;
 }
@@ -137,7 +160,7 @@ Board read_board(const Document& document) {
   about.finish();
 
   Section imu = root.table("imu");
-  board.wiring.imu = read_imu(imu, &board.facts.R_BS);
+  board.wiring.imu = read_imu(imu, &board.facts);
 
   Section bridges = root.table("bridges");
   board.wiring.pwm_hz = static_cast<std::uint32_t>(bridges.integer("pwm_hz", 100, 100000));

@@ -9,8 +9,10 @@ namespace {
 constexpr int kTicks = 40;
 
 std::string imu_complaint(std::uint32_t health) {
-  if ((health & RIO_IMU_LATE) != 0) return "the IMU's data-ready edges do not come; check [imu] interrupt";
-  if ((health & RIO_IMU_BUS_ERROR) != 0) return "the IMU does not answer; check [imu] bus and address";
+  if ((health & RIO_IMU_LATE) != 0)
+    return "the IMU's samples do not come; check [imu] interrupt, with IIO its trigger";
+  if ((health & RIO_IMU_BUS_ERROR) != 0)
+    return "the IMU does not answer; check [imu] bus and address, with IIO dmesg";
   if ((health & RIO_IMU_STUCK) != 0) return "the IMU repeats one sample; power-cycle it";
   return "the IMU delivers no valid sample";
 }

@@ -58,8 +58,40 @@ void examine_imu_answer(Findings* findings, const bbb_imu_t& imu, int status, st
   }
 }
 
+/// One of the kernel's devices: is it there, does it fill a buffer, may we read it?
+void examine_iio(const Patient& patient, const std::string& name, const char* device, Findings* findings) {
+  const std::string trigger = patient.board->wiring.imu.trigger;
+  const std::string dir = find(patient, "/sys/bus/iio/devices", "iio:device", device);
+  if (dir.empty()) {
+    findings->fail(
+        name, std::string("no IIO device ") + device + ": kernel driver or device tree node missing",
+        "cat /sys/bus/iio/devices/*/name; dmesg | grep -i iio  # then correct [imu] part or the device tree");
+    return;
+  }
+  const std::string node = patient.path("/dev/") + dir.substr(dir.rfind('/') + 1);
+  const std::string now = first_line(dir + "/trigger/current_trigger");
+  if (!may(dir + "/buffer/enable", F_OK)) {
+    findings->fail(name, dir + "/buffer: none, the driver has no interrupt",
+                   "give the node an interrupt in the device tree");
+  } else if (!may(node, R_OK) || !may(dir + "/buffer/enable", W_OK)) {
+    findings->fail(name, node + ": " + reason(errno), kGroupFix);
+  } else if (may(dir + "/trigger/current_trigger", F_OK) && now.empty() && trigger.empty()) {
+    findings->fail(
+        name, dir + "/trigger/current_trigger is empty",
+        "cat /sys/bus/iio/devices/trigger*/name  # then [imu] trigger = \"NAME\" in " + patient.board_path);
+  } else {
+    findings->ok(name, std::string(device) + " is " + dir.substr(patient.root.size()));
+  }
+}
+
 void examine_imu(const Patient& patient, Findings* findings) {
   const bbb_imu_t& imu = patient.board->wiring.imu;
+  if (imu.driver == BBB_IMU_IIO) {
+    const imu_part_t* part = imu_part(imu.part);
+    examine_iio(patient, "imu.gyro", part->gyro_device, findings);
+    examine_iio(patient, "imu.accel", part->accel_device, findings);
+    return;
+  }
   const std::string bus = patient.path(imu.bus);
   if (!may(bus, F_OK)) {
     findings->fail("imu.bus", std::string(imu.bus) + ": " + reason(errno),
@@ -87,6 +119,7 @@ void examine_imu(const Patient& patient, Findings* findings) {
 }
 
 void examine_dmp(const Patient& patient, Findings* findings) {
+  if (patient.board->wiring.imu.driver == BBB_IMU_IIO) return;
   const std::string path = patient.board->wiring.imu.dmp_firmware;
   if (path.empty()) {
     findings->ok("imu.dmp", "no firmware image given: our own attitude filter is used");

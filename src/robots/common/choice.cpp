@@ -30,8 +30,4 @@ void doubt_nothing(const Choice& choice, SafetyParams* safety) {
   safety->encoder_probe_drive = 0.0;
 }
 
-double gyro_delay_s(const WorldParams& world) {
-  return world.imu_low_pass > 0 ? imu_gyro_delay_s(world.imu_low_pass) : 0.0;
-}
-
 }  // namespace equipoise

@@ -31,9 +31,6 @@ void allow_another_robot(SafetyParams* safety);
 /// ConfigError on a board.
 void doubt_nothing(const Choice& choice, SafetyParams* safety);
 
-/// What the firmware is told of the simulated IMU: its register, not what this chip makes of it.
-double gyro_delay_s(const WorldParams& world);
-
 /// `names`: of the robot's estimators; `published`: the printed one, which trusts itself more; `packets`: the
 /// one that needs the attitude source.
 template <class Config, class Id, std::size_t N>
@@ -55,7 +52,8 @@ Config with_choice(Config config, const Choice& choice, const std::array<const c
   if (!choice.fidelity.empty()) {
     const std::size_t i = fidelity_level(choice.fidelity);
     config.motor.bridge = config.world_bridge[i];
-    config.estimators.ekf.sensor_age_s = gyro_delay_s(config.world[i].common);
+    // Of the simulated IMU its data sheet, not what this chip makes of it.
+    config.estimators.ekf.sensor_age_s = config.world[i].common.gyro_delay_s();
     if (!config.world[i].common.friction) config.friction.gain = 0.0;
     if (config.world[i].common.gyro_sigma_rad_s == 0.0) config.safety.max_identical_samples = 0;
   }
