@@ -15,6 +15,7 @@ class BbbIioTest : public BoardFixture {
     config_.imu.driver = BBB_IMU_IIO;
     config_.imu.part = 0;
     config_.imu.interrupt.used = false;
+    config_.imu.late_after_us = 50000;  // this machine may be busy
     dir_ = addDevice("iio", "2-0068/iio:device1",
                      iio_attributes("mpu9250", {"in_accel", "in_anglvel"}, "be:s16/16>>0"));
     node_ = std::make_unique<FakeIio>(hostPath("/dev/iio:device1"));
@@ -60,7 +61,7 @@ TEST_F(BbbIioTest, WithoutScansTicksAreLateAndGoOn) {
     EXPECT_EQ(sample.valid & RIO_IMU, 0u);
     EXPECT_EQ(sample.health, uint32_t{RIO_IMU_LATE});
   }
-  EXPECT_LT(monotonic_ns() - began_ns, 100'000'000);
+  EXPECT_LT(monotonic_ns() - began_ns, 1'000'000'000);
   push(monotonic_ns());
   EXPECT_EQ(tick().health, 0u);
   bbb_status_t status;
