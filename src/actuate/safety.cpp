@@ -1,4 +1,5 @@
 #include "equipoise/actuate/safety.hpp"
+#include "equipoise/actuate/degraded.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -78,7 +79,7 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   // A reversed encoder surprises the estimator, too: the check that can name the wheel goes first.
   surprised_ = count(surprised_,
                      in.encoders_in_check || !(innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation));
-  const int patience = left_out_ != 0 ? kLeftOutTicks : ticks(p_.max_innovation_s);
+  const int patience = (left_out_ & ~kWithoutGyroAxis) != 0 ? kLeftOutTicks : ticks(p_.max_innovation_s);
   unhealthy_ = surprised_ > (unhealthy_ ? 0 : patience);
   falling_ = count(falling_, !(in.imu_ok && in.accel_m_s2 < kFreeFall_m_s2));
   const double fastest =
