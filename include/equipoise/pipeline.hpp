@@ -27,6 +27,7 @@ struct TickResult {
   std::uint32_t reasons = 0;   // SafetyReason bits
   std::uint32_t inhibit = 0;   // those of them that the runtime asked for
   std::uint32_t degraded = 0;  // DegradedBit: what the robot does without
+  FaultEvidence faults;
 };
 
 template <class Robot, class Estimators, class Reference, class Feedback>
@@ -252,6 +253,7 @@ auto Pipeline<Robot, Estimators, Reference, Feedback>::tick(const RawSample& raw
   t.arm_state = safety_.state();
   t.reasons = safety_.reasons();
   t.inhibit = loop.inhibit;
+  t.faults = health_.evidence;
   return t;
 }
 

@@ -45,6 +45,7 @@ class Recorder {
     fields::each_message(
         r, [&](auto message, const char* channel, const auto& record) { put(message, channel, record, r); });
     if (r.has_truth) put(fields::State{}, fields::kTruthChannel, r.truth, r);
+    if (r.faults.bound > 0.0) put(fields::Faults{}, fields::kFaultsChannel, r.faults, r);
     for (std::size_t i = 0; i < compared_.size() && i < r.others.size(); ++i) {
       if ((r.compared >> i & 1U) != 0) put(fields::State{}, compared_[i].c_str(), r.others[i], r);
     }

@@ -56,6 +56,7 @@ class Telemetry::Writer : NoCopy {
   }
 
   void write(const TickRecord& r) {
+    if (options_.watch) options_.watch(r);
     publish_now_ = lcm_ != nullptr && publish_due();
     utime_ = r.now_ns / 1000;
     tick_ = r.tick;
@@ -97,6 +98,7 @@ class Telemetry::Writer : NoCopy {
       if ((r.compared & (1U << i)) != 0) encoded(fields::State{}, channels_[i].c_str(), r.others[i]);
     }
     if (r.has_truth) encoded(fields::State{}, fields::kTruthChannel, r.truth);
+    if (r.faults.bound > 0.0) encoded(fields::Faults{}, fields::kFaultsChannel, r.faults);
   }
 
   /// What the buffer holds.

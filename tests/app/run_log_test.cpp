@@ -151,6 +151,7 @@ TEST(FieldList, IsWhatTheLcmTypesDeclare) {
   expect_same_layout(fields::Histogram{}, fields::HistogramRecord{});
   expect_same_layout(fields::Run{}, runtime::RunInfo{});
   expect_same_layout(fields::End{}, runtime::EndRecord{});
+  expect_same_layout(fields::Faults{}, FaultEvidence{});
 }
 
 TEST(FieldList, HoldsEveryByteOfASampleAndOfAState) {
@@ -174,6 +175,7 @@ TEST(FieldList, EncodesWhatGeneratedCodeDecodes) {
   expect_generated_code_agrees<timing_histogram_t>(fields::Histogram{}, fields::HistogramRecord{});
   expect_generated_code_agrees<run_t>(fields::Run{}, runtime::RunInfo{});
   expect_generated_code_agrees<verdict_t>(fields::End{}, runtime::EndRecord{});
+  expect_generated_code_agrees<faults_t>(fields::Faults{}, FaultEvidence{});
 }
 
 TEST(FieldList, PutsEachFieldWhereTheGeneratedCodeLooksForIt) {
@@ -267,6 +269,31 @@ TEST(RunLog, TheEndIsTheRunsOwnJudgement) {
   ASSERT_TRUE(log.end());
   EXPECT_EQ(log.end()->ended, 2);
   EXPECT_EQ(log.end()->duration_s, 4.5);
+}
+
+TEST(RunLog, WhatWasWeighedIsInTheTicksThatHaveIt) {
+  FaultEvidence faults;
+  faults.leading = 20;
+  faults.ratio = 21.5;
+  faults.bound = 18.6;
+  faults.decided = true;
+  faults.verdicts = 1U << 20U;
+  Bytes bytes;
+  runtime::encode(fields::Faults{}, faults, 0, 0, &bytes);
+  const std::string weighed = event(fields::kFaultsChannel, bytes);
+  RunLog log(run_event() + tick_events(0) + weighed + tick_events(1) + weighed + tick_events(2), "a.lcm");
+  TickRecord tick;
+  ASSERT_TRUE(log.next(&tick));
+  EXPECT_EQ(tick.faults.leading, 20);
+  EXPECT_EQ(tick.faults.ratio, 21.5);
+  EXPECT_TRUE(tick.faults.decided);
+  EXPECT_EQ(tick.faults.verdicts, 1U << 20U);
+  for (int without = 1; without <= 2; ++without) {  // another tick's, and an older log's
+    ASSERT_TRUE(log.next(&tick));
+    EXPECT_EQ(tick.faults.bound, 0.0) << without;
+    EXPECT_FALSE(tick.faults.decided) << without;
+  }
+  EXPECT_EQ(log.incomplete_ticks(), 0);
 }
 
 TEST(RunLog, EachEstimatorKeepsItsPlaceAndOnlySoManyHaveOne) {

@@ -1,5 +1,6 @@
 // What may be wrong with a robot's sensors, as one table, and what only looks like it. In: number of wheels
-// -> out: the hypotheses. Plain values, RT-safe.
+// -> out: the hypotheses; their rows in the table of every robot, whose names all readers show
+// (tools/equipoise_tools/names.py). Plain values, RT-safe.
 #pragma once
 
 #include <array>
@@ -58,5 +59,61 @@ constexpr auto fault_hypotheses() noexcept {
   all[n++] = {FaultHypothesis::kNoise, 0};
   return all;
 }
+
+/// Everybody's bits on the wire.
+inline constexpr std::array<const char*, fault_hypotheses<4>().size()> kFaultNames{
+    // of a robot with four wheels
+    "encoder_1",
+    "encoder_2",
+    "encoder_3",
+    "encoder_4",
+    "encoder_1_reversed",
+    "encoder_2_reversed",
+    "encoder_3_reversed",
+    "encoder_4_reversed",
+    "encoders_1_2",
+    "encoders_1_3",
+    "encoders_1_4",
+    "encoders_2_3",
+    "encoders_2_4",
+    "encoders_3_4",
+    "gyro_x",
+    "gyro_y",
+    "gyro_z",
+    "gyro_x_y_swapped",
+    "gyro_y_z_swapped",
+    "gyro_z_x_swapped",
+    "gyro_bias",
+    "imu",
+    "spin",
+    "slip",
+    "push",
+    "imu_noise"};
+static_assert(kFaultNames.size() <= 32, "FaultEvidence::verdicts has a bit for each");
+
+/// Of each hypothesis of a robot its row among kFaultNames.
+template <int Wheels>
+constexpr auto fault_rows() noexcept {
+  constexpr auto kAll = fault_hypotheses<4>();
+  constexpr auto kOwn = fault_hypotheses<Wheels>();
+  std::array<std::int32_t, kOwn.size()> rows{};
+  for (std::size_t i = 0; i < kOwn.size(); ++i) {
+    while (kAll[static_cast<std::size_t>(rows[i])].kind != kOwn[i].kind ||
+           kAll[static_cast<std::size_t>(rows[i])].mask != kOwn[i].mask)
+      ++rows[i];
+  }
+  return rows;
+}
+
+/// What was weighed in a tick. Ratios are log-likelihoods over what is used, prior included, in nats.
+struct FaultEvidence {
+  std::int32_t leading = -1;  // row of kFaultNames; -1: none
+  double ratio = 0.0;
+  double bound = 0.0;           // 0: no hypothesis is weighed in this run
+  std::int32_t runner_up = -1;  // among those with another consequence; -1: that all is well
+  double runner_up_ratio = 0.0;
+  bool decided = false;        // in this tick: a verdict is taken, or taken back
+  std::uint32_t verdicts = 0;  // bit per row: what is held to be faulty; of a disarmed robot, what was
+};
 
 }  // namespace equipoise

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "equipoise/estimate/fault_hypotheses.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise {
@@ -21,9 +22,25 @@ struct EstimatorHealth {
   bool gyro_left_out = false;     // an axis of it
   bool gyro_bias_jumped = false;  // and is taken off since
   bool gyro_trusted = true;
-  bool gyro_bias_known = true;   // found at rest, before arming
+  bool gyro_bias_known = true;  // found at rest, before arming
+  FaultEvidence evidence;
   bool predicts_wheels = false;  // `wheel_rate_rad_s` may stand in for an encoder
   Vec<Wheels> wheel_rate_rad_s = Vec<Wheels>::Zero();
 };
+
+/// `faults`: a SensorFaults.
+template <class Faults, int Wheels>
+void report(const Faults& faults, EstimatorHealth<Wheels>* health) noexcept {
+  const std::uint32_t wheels = faults.excluded_wheels();
+  health->lost = wheels;
+  health->dead = (wheels & (wheels - 1)) != 0 ? wheels : 0;
+  health->stood_still = faults.stood_still();
+  health->while_arming = faults.while_arming();
+  health->checking = faults.suspects();
+  health->gyro_left_out = faults.gyro_axis_excluded();
+  health->gyro_bias_jumped = faults.bias_jumps() > 0;
+  health->gyro_trusted = faults.trusted();
+  health->evidence = faults.evidence();
+}
 
 }  // namespace equipoise

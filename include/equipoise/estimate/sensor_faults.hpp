@@ -58,6 +58,7 @@ class SensorFaults {
   void reset(const Filter& control, double rest_sigma_rad_s) noexcept {
     healthy_.adopt(control);
     used_ = Used{};
+    evidence_ = {-1, 0.0, kBound, -1, 0.0, false, evidence_.verdicts};
     gross_.reset();
     weigh_.reset(rest_sigma_rad_s);
     trusted_ = true;
@@ -67,7 +68,7 @@ class SensorFaults {
 
   /// One tick of `control`, which goes on without what is found faulty. `expected_rad_s`: rates of the body.
   void step(Filter& control, const Input& u, const Sample& raw, const Vec3& expected_rad_s) noexcept {
-    ++ticks_;
+    evidence_ = {-1, 0.0, kBound, -1, 0.0, false, ticks_++ == 0 ? 0 : evidence_.verdicts};
     const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
     hear_vibration(control, {});
     control.predict(u);
@@ -97,10 +98,12 @@ class SensorFaults {
   bool while_arming() const noexcept { return used_.without_wheels != 0 && excluded_at_ <= kArmingTicks; }
   bool stood_still() const noexcept { return stood_still_; }
   double ratio(std::size_t hypothesis) const noexcept { return members_[hypothesis].ratio; }
+  const FaultEvidence& evidence() const noexcept { return evidence_; }
 
  private:
   using Evidence = equipoise::Evidence<Filter, Wheels>;
   using Used = UsedSensors<Wheels>;
+  static constexpr auto kRows = fault_rows<Wheels>();
 
   // Decisions, in nats. A false alarm in ten hours of ticks and sixteen hypotheses: ln(7.2e6 * 16)
   // (Lorden 1971).
@@ -310,30 +313,36 @@ class SensorFaults {
         static_cast<std::size_t>(std::max_element(weight.begin(), weight.end()) - weight.begin());
     const int leads = consequence(best);
     suspects_ = leads != kNone && weight[best] > kMargin;
+    double second = 0.0;
+    std::size_t runner_up = best;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      if (!(weight[i] > second) || consequence(i) == leads) continue;
+      second = weight[i];
+      runner_up = i;
+    }
+    const std::int32_t next = runner_up == best ? -1 : kRows[runner_up];
+    evidence_ = {kRows[best], weight[best], kBound, next, second, false, evidence_.verdicts};
     if (!(weight[best] > kBound)) {
       undecided_ = 0;
       return;
     }
     if (leads == kNone) return happened(best, control);
-    double second = 0.0;
-    std::size_t runner_up = best;
-    for (std::size_t i = 0; i < kCount; ++i) {
-      if (consequence(i) == leads || !(weight[i] > second)) continue;
-      second = weight[i];
-      runner_up = i;
-    }
     // One encoder or two? What holds for two had better not be taken for one.
     const bool nested = kHypotheses[runner_up].kind == FaultHypothesis::kWheels;
     if (weight[best] - second < (nested ? 2.0 : 1.0) * kMargin) {
-      if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) trusted_ = false;
+      if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) stop(best, runner_up);
       return;
     }
-    if (leads == kStop) {
-      trusted_ = false;
-      return;
-    }
+    if (leads == kStop) return stop(best, best);
     use(best);
     control.adopt(healthy_);
+  }
+
+  /// One of them is true; the robot cannot go on with either.
+  void stop(std::size_t one, std::size_t other) noexcept {
+    evidence_.decided = trusted_;
+    evidence_.verdicts |= 1U << kRows[one] | 1U << kRows[other];
+    trusted_ = false;
   }
 
   /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
@@ -362,6 +371,8 @@ class SensorFaults {
     used_.without_wheels = without;
     healthy_.adopt(m.filter);
     if (h.kind == FaultHypothesis::kBias) ++jumps_;
+    evidence_.decided = true;
+    evidence_.verdicts = used_.verdicts();
     begin_all();
   }
 
@@ -372,6 +383,7 @@ class SensorFaults {
   Filter before_;   // a tick ago
   std::array<Member, kCount> members_;
   Used used_;
+  FaultEvidence evidence_;
   std::array<double, 3> quiet_{};  // the gyro's variances
   bool stale_ = true;              // members have missed a tick
   bool trusted_ = true;
@@ -383,18 +395,5 @@ class SensorFaults {
   int event_at_ = 0;  // tick
   int undecided_ = 0;
 };
-
-template <class Filter, int Wheels>
-void report(const SensorFaults<Filter, Wheels>& faults, EstimatorHealth<Wheels>* health) noexcept {
-  const std::uint32_t wheels = faults.excluded_wheels();
-  health->lost = wheels;
-  health->dead = (wheels & (wheels - 1)) != 0 ? wheels : 0;
-  health->stood_still = faults.stood_still();
-  health->while_arming = faults.while_arming();
-  health->checking = faults.suspects();
-  health->gyro_left_out = faults.gyro_axis_excluded();
-  health->gyro_bias_jumped = faults.bias_jumps() > 0;
-  health->gyro_trusted = faults.trusted();
-}
 
 }  // namespace equipoise

@@ -43,6 +43,22 @@ struct UsedSensors {
     return s;
   }
 
+  /// Bit per row of kFaultNames: what they are read by.
+  std::uint32_t verdicts() const noexcept {
+    constexpr auto kHypotheses = fault_hypotheses<Wheels>();
+    constexpr auto kRows = fault_rows<Wheels>();
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < kRows.size(); ++i) bits |= (holds(kHypotheses[i]) ? 1U : 0U) << kRows[i];
+    return bits;
+  }
+  bool holds(const FaultHypothesis& h) const noexcept {
+    if (h.kind == FaultHypothesis::kWheel) return (without_wheels & ~backwards & h.mask) != 0;
+    if (h.kind == FaultHypothesis::kReversed) return (backwards & h.mask) != 0;
+    if (h.kind == FaultHypothesis::kAxis) return (without_axes & h.mask) != 0;
+    if (h.kind == FaultHypothesis::kSwap) return swapped == h.mask;
+    return h.kind == FaultHypothesis::kBias && !bias_rad_s.isZero(0.0);
+  }
+
   /// A hypothesis turns over what is used of its sensors: an excluded one may be healthy again.
   UsedSensors turned_over(const FaultHypothesis& h) const noexcept {
     UsedSensors u = *this;

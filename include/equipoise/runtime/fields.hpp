@@ -79,6 +79,21 @@ struct Health {
   }
 };
 
+/// Of a FaultEvidence.
+struct Faults {
+  static constexpr const char* kType = "faults_t";
+  template <class Record, class Visit>
+  static constexpr void visit(Record& r, Visit&& field) {
+    field("leading", "", r.leading);
+    field("ratio", "nat", r.ratio);
+    field("bound", "nat", r.bound);
+    field("runner_up", "", r.runner_up);
+    field("runner_up_ratio", "nat", r.runner_up_ratio);
+    field("decided", "", r.decided);
+    field("verdicts", "bits", r.verdicts);
+  }
+};
+
 struct Timing {
   static constexpr const char* kType = "timing_t";
   template <class Record, class Visit>
@@ -140,6 +155,7 @@ inline constexpr const char* kSensorsChannel = "EQUIPOISE_SENSORS";
 inline constexpr const char* kHistogramChannel = "EQUIPOISE_TIMING_HISTOGRAM";
 inline constexpr const char* kEndChannel = "EQUIPOISE_VERDICT";
 inline constexpr const char* kTruthChannel = "EQUIPOISE_TRUTH";
+inline constexpr const char* kFaultsChannel = "EQUIPOISE_FAULTS";  // where hypotheses are weighed
 /// Of an estimator that runs beside the controlling one: this and its name in capitals.
 inline constexpr std::string_view kComparedChannel = "EQUIPOISE_STATE_";
 

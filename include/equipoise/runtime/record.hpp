@@ -8,6 +8,7 @@
 #include <string>
 #include <type_traits>
 
+#include "equipoise/estimate/fault_hypotheses.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise::runtime {
@@ -67,6 +68,7 @@ struct TickRecord {
   std::uint32_t reasons;
   std::uint32_t degraded;  // bits of what the robot does without; 0: all is well
   double battery_V;
+  FaultEvidence faults;
   // timing
   std::int64_t wake_late_ns;
   std::int64_t compute_ns;

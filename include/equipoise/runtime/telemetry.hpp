@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,6 +33,7 @@ struct TelemetryOptions {
   double max_publish_hz = 25.0;         // of wall-clock time, for eyes; the log always has every tick
   bool wait_when_full = false;          // simulation faster than real time: wait rather than drop
   std::vector<std::string> estimators;  // names of TickRecord::others
+  std::function<void(const TickRecord&)> watch;  // called by the thread, record by record
   RunInfo run;
 };
 

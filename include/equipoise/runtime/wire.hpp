@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <equipoise/command_t.hpp>
+#include <equipoise/faults_t.hpp>
 #include <equipoise/health_t.hpp>
 #include <equipoise/motors_t.hpp>
 #include <equipoise/run_t.hpp>
@@ -33,6 +34,7 @@ inline std::int64_t fingerprint(fields::CommandFields) { return command_t::getHa
 inline std::int64_t fingerprint(fields::State) { return state_t::getHash(); }
 inline std::int64_t fingerprint(fields::Motors) { return motors_t::getHash(); }
 inline std::int64_t fingerprint(fields::Health) { return health_t::getHash(); }
+inline std::int64_t fingerprint(fields::Faults) { return faults_t::getHash(); }
 inline std::int64_t fingerprint(fields::Timing) { return timing_t::getHash(); }
 inline std::int64_t fingerprint(fields::Histogram) { return timing_histogram_t::getHash(); }
 inline std::int64_t fingerprint(fields::End) { return verdict_t::getHash(); }

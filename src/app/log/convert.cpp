@@ -80,6 +80,7 @@ class CsvRows {
   explicit CsvRows(const std::string& path) {
     for (const std::string& channel : channels_of(path)) {
       has_truth_ = has_truth_ || channel == fields::kTruthChannel;
+      has_faults_ = has_faults_ || channel == fields::kFaultsChannel;
       if (channel.rfind(fields::kComparedChannel, 0) == 0)
         estimators_.push_back(short_name(channel.substr(fields::kComparedChannel.size())));
     }
@@ -95,6 +96,7 @@ class CsvRows {
       add(short_name(channel), numbers_of(message, record));
     });
     if (has_truth_) add("truth", numbers_of(fields::State{}, none.truth));
+    if (has_faults_) add("faults", numbers_of(fields::Faults{}, none.faults));
     for (const std::string& estimator : estimators_)
       add("state_" + estimator, numbers_of(fields::State{}, none.estimate));
     return line + "\n";
@@ -111,6 +113,7 @@ class CsvRows {
       cells(numbers_of(message, record), true);
     });
     if (has_truth_) cells(numbers_of(fields::State{}, tick.truth), tick.has_truth);
+    if (has_faults_) cells(numbers_of(fields::Faults{}, tick.faults), tick.faults.bound > 0.0);
     for (const std::string& estimator : estimators_) {
       const auto found = std::find(others.begin(), others.end(), estimator);
       const auto i = static_cast<std::size_t>(found - others.begin());
@@ -129,7 +132,7 @@ class CsvRows {
     }
   }
 
-  bool has_truth_ = false;
+  bool has_truth_ = false, has_faults_ = false;
   std::vector<std::string> estimators_;
   std::string row_;
 };
@@ -171,6 +174,7 @@ class McapMessages {
         message(event, utime, tick, numbers_of(type, record));
     };
     if (state) take(fields::State{}, tick_.truth);
+    if (event.channel == fields::kFaultsChannel) take(fields::Faults{}, tick_.faults);
     if (event.channel == fields::kHistogramChannel) take(fields::Histogram{}, histogram_);
     if (event.channel == fields::kEndChannel) take(fields::End{}, end_);
     fields::each_message(tick_, [&](auto type, std::string_view channel, auto& record) {

@@ -83,6 +83,8 @@ void RunLog::take(const LogEvent& event) {
   };
   if (event.channel == fields::kTruthChannel) {
     tick_.has_truth = decoded(fields::State{}, &tick_.truth);
+  } else if (event.channel == fields::kFaultsChannel) {
+    if (!decoded(fields::Faults{}, &tick_.faults)) tick_.faults = {};
   } else if (event.channel == fields::kEndChannel) {
     runtime::EndRecord end;
     if (decoded(fields::End{}, &end)) end_ = end;

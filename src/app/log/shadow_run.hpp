@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <tuple>
 
 #include "app/log/shadow.hpp"
 #include "app/log/smoother.hpp"
@@ -231,6 +232,7 @@ class ShadowRun {
     degraded_ = degraded;
     if (alarm.hypothesis.empty()) return;
     statistic(reasons, health, view(t.x_hat, params_.robot), &alarm);
+    if (t.faults.decided) std::tie(alarm.ratio, alarm.bound) = std::tie(t.faults.ratio, t.faults.bound);
     out_.alarms.push_back(alarm);
   }
 

@@ -108,6 +108,7 @@ class FirmwareOf : public Firmware {
     record->arm_state = static_cast<std::int32_t>(t.arm_state);
     record->reasons = t.reasons;
     record->degraded = t.degraded;
+    record->faults = t.faults;
     record->battery_V = t.z.battery_V;
   }
 

@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "robots/mbbr/config.hpp"
 #include "robots/mbbr/ekf.hpp"
@@ -40,6 +42,39 @@ TEST(FaultHypotheses, EveryEncoderPairAndAxisHasItsOwn) {
   EXPECT_EQ(kinds[FaultHypothesis::kSwap], 3);
   for (int kind = FaultHypothesis::kBias; kind <= FaultHypothesis::kNoise; ++kind) EXPECT_EQ(kinds[kind], 1);
   EXPECT_EQ(fault_hypotheses<2>().size(), 2U + 2U + 1U + 3U + 3U + 6U);
+}
+
+TEST(FaultHypotheses, HaveTheirNamesByOneTableForEveryRobot) {
+  const auto name = [](std::int32_t row) { return std::string(kFaultNames[static_cast<std::size_t>(row)]); };
+  constexpr auto mbbr = fault_rows<3>();
+  constexpr auto edumip = fault_rows<2>();
+  std::string names;
+  for (const std::int32_t row : mbbr) names += name(row) + " ";
+  EXPECT_EQ(names,
+            "encoder_1 encoder_2 encoder_3 encoder_1_reversed encoder_2_reversed encoder_3_reversed "
+            "encoders_1_2 encoders_1_3 encoders_2_3 gyro_x gyro_y gyro_z gyro_x_y_swapped gyro_y_z_swapped "
+            "gyro_z_x_swapped gyro_bias imu spin slip push imu_noise ");
+  EXPECT_EQ(name(edumip[4]), "encoders_1_2");
+  EXPECT_EQ(name(edumip.back()), "imu_noise");
+}
+
+TEST(UsedSensors, SayWhichVerdictsTheyAreReadBy) {
+  const auto bit = [](const FaultHypothesis& h) {
+    return h.kind == FaultHypothesis::kWheel ? h.mask : h.kind == FaultHypothesis::kAxis ? h.mask << 14U : 0U;
+  };
+  UsedSensors<3> used;
+  EXPECT_EQ(used.verdicts(), 0U);
+  for (const FaultHypothesis& h :
+       {FaultHypothesis{FaultHypothesis::kWheel, 0b010}, {FaultHypothesis::kAxis, 0b100}}) {
+    EXPECT_EQ(used.turned_over(h).verdicts(), bit(h));
+    EXPECT_EQ(used.turned_over(h).turned_over(h).verdicts(), 0U) << "taken back";
+  }
+  EXPECT_EQ(used.turned_over({FaultHypothesis::kWheels, 0b101}).verdicts(), 0b101U);
+  EXPECT_EQ(used.turned_over({FaultHypothesis::kSwap, 0b110}).verdicts(), 1U << 18U);
+  used.without_wheels = used.backwards = 0b100;
+  EXPECT_EQ(used.verdicts(), 1U << 6U) << "not the encoder's own, too";
+  used.bias_rad_s.x() = 0.2;
+  EXPECT_EQ(used.verdicts(), 1U << 6U | 1U << 20U);
 }
 
 TEST(UsedSensors, ReadWhatIsWrongTheOtherWayRound) {
@@ -244,6 +279,61 @@ TEST_F(Standing, ABiasThatJumpsIsTakenOff) {
   EXPECT_GE(found, 400);
   EXPECT_LE(found, 440) << "0.2 s: 0.3 rad/s make 0.06 rad of it";
   EXPECT_TRUE(detector.trusted());
+}
+
+TEST_F(Standing, AVerdictSaysWhatLedAndByHowMuch) {
+  constexpr std::int32_t kRow = 20;  // gyro_bias
+  Detector detector = armed();
+  EXPECT_EQ(detector.evidence().leading, -1);
+  EXPECT_GT(detector.evidence().bound, 0.0);
+  std::vector<FaultEvidence> decided;
+  double before = 0.0;
+  for (int tick = 0; tick < 600 && decided.empty(); ++tick) {
+    Sample z = sample();
+    if (tick >= 400) z.gyro_B_rad_s += Vec3(0.3, -0.25, 0.2);
+    detector.step(control, Vec3::Zero(), z, Vec3::Zero());
+    const FaultEvidence& e = detector.evidence();
+    ASSERT_GE(e.leading, 0);
+    ASSERT_NE(e.leading, e.runner_up);
+    ASSERT_EQ(e.decided, detector.bias_jumps() > 0);
+    if (e.decided) decided.push_back(e);
+    if (!e.decided) {
+      ASSERT_EQ(e.verdicts, 0U);
+      before = e.ratio;
+    }
+  }
+  ASSERT_EQ(decided.size(), 1U);
+  const FaultEvidence verdict = decided[0];
+  EXPECT_EQ(verdict.leading, kRow);
+  EXPECT_GT(verdict.ratio, verdict.bound);
+  EXPECT_LE(before, verdict.bound) << "a tick before it was not beyond it";
+  EXPECT_GE(verdict.ratio - verdict.runner_up_ratio, 5.0) << "the margin";
+  EXPECT_EQ(verdict.verdicts, 1U << kRow);
+  detector.step(control, Vec3::Zero(), sample(), Vec3::Zero());
+  EXPECT_FALSE(detector.evidence().decided) << "once";
+  EXPECT_EQ(detector.evidence().verdicts, 1U << kRow);
+  detector.reset(control, gyro_sigma_rad_s);
+  EXPECT_EQ(detector.evidence().verdicts, 1U << kRow) << "a reader that misses ticks sees why it is disarmed";
+  EXPECT_EQ(detector.evidence().leading, -1);
+  detector.step(control, Vec3::Zero(), sample(), Vec3::Zero());
+  EXPECT_EQ(detector.evidence().verdicts, 0U);
+}
+
+/// The robot does not balance without its x axis.
+TEST_F(Standing, WhatStopsTheRobotIsAVerdictOnce) {
+  Detector detector = armed();
+  int decided = 0;
+  for (int tick = 0; tick < 800; ++tick) {
+    Sample z = sample();
+    if (tick >= 400) z.gyro_B_rad_s.x() = tick % 2 == 0 ? 1.5 : -1.5;
+    detector.step(control, Vec3::Zero(), z, Vec3::Zero());
+    decided += detector.evidence().decided && !detector.trusted() ? 1 : 0;
+    if (!detector.trusted()) {
+      ASSERT_NE(detector.evidence().verdicts, 0U) << tick;
+    }
+  }
+  ASSERT_FALSE(detector.trusted());
+  EXPECT_EQ(decided, 1);
 }
 
 /// The control's filter goes on as if there were no detector.

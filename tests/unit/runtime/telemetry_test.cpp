@@ -8,6 +8,7 @@
 #include <iterator>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "support/log_folder.hpp"
 
@@ -30,6 +31,23 @@ TEST_F(TelemetryTest, WhatFindsNoRoomIsReported) {
   const TelemetryReport report = telemetry.finish(EndRecord{});
   EXPECT_GT(report.dropped, 0);
   EXPECT_EQ(report.records + report.dropped, kTicks);
+}
+
+TEST_F(TelemetryTest, WhoWatchesSeesEveryRecordOnTheWritersThread) {
+  std::vector<std::int64_t> seen;
+  std::thread::id watcher;
+  TelemetryOptions options;
+  options.wait_when_full = true;
+  options.watch = [&](const TickRecord& r) {
+    seen.push_back(r.tick);
+    watcher = std::this_thread::get_id();
+  };
+  Telemetry telemetry(options);
+  TickRecord record{};
+  for (record.tick = 0; record.tick < 3; ++record.tick) telemetry.hand_over(record);
+  (void)telemetry.finish(EndRecord{});
+  EXPECT_EQ(seen, (std::vector<std::int64_t>{0, 1, 2}));
+  EXPECT_NE(watcher, std::this_thread::get_id()) << "the tick waits for nobody's terminal";
 }
 
 /// A message costs its packet and the kernel's way: with 8 a record, more than everything else that is
