@@ -65,6 +65,7 @@ class Run(Figures):
     duty_max: float
     saturated_fraction: float
     degraded: list[str]
+    verdicts: list[dict[str, Any]] | None  # on sensors; None: no hypothesis was weighed
     ticks: int
     real_time_factor: float
     estimators: dict[str, dict[str, float | None]]

@@ -84,6 +84,17 @@ TEST(Compare, KnowsPlainFieldsMotorsAndHealth) {
   EXPECT_FALSE(compared(logged, replayed).found) << "what went into the tick was not computed";
 }
 
+TEST(Compare, KnowsWhatWasWeighedWhereTheLogDoes) {
+  TickRecord logged{};
+  TickRecord replayed{};
+  replayed.faults = {3, 2.0, 18.6, -1, 0.0, false, 0};
+  EXPECT_FALSE(compared(logged, replayed).found) << "an older log";
+  logged.faults = replayed.faults;
+  EXPECT_FALSE(compared(logged, replayed).found);
+  replayed.faults.ratio = 2.5;
+  EXPECT_EQ(compared(logged, replayed).field, "EQUIPOISE_FAULTS.ratio");
+}
+
 TEST(Compare, AnyNaNIsAnyOtherAndNoNumber) {
   TickRecord logged{};
   TickRecord replayed{};

@@ -29,14 +29,14 @@ struct Computed {
   double value;
 };
 
-/// In the order of the tick.
-std::vector<Computed> computed(const runtime::TickRecord& r) {
+/// In the order of the tick. `faults`: an older log has none.
+std::vector<Computed> computed(const runtime::TickRecord& r, bool faults) {
+  namespace fields = runtime::fields;
   std::vector<Computed> out;
-  runtime::fields::each_message(r, [&](auto message, const char* channel, const auto& record) {
+  const auto add = [&](auto message, const char* channel, const auto& record) {
     using Message = decltype(message);
-    if constexpr (std::is_same_v<Message, runtime::fields::State> ||
-                  std::is_same_v<Message, runtime::fields::Motors> ||
-                  std::is_same_v<Message, runtime::fields::Health>) {
+    if constexpr (std::is_same_v<Message, fields::State> || std::is_same_v<Message, fields::Motors> ||
+                  std::is_same_v<Message, fields::Health> || std::is_same_v<Message, fields::Faults>) {
       Message::visit(record, [&](const char* field, const char*, const auto& value) {
         if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
           out.push_back({channel, field, -1, static_cast<double>(value)});
@@ -46,7 +46,9 @@ std::vector<Computed> computed(const runtime::TickRecord& r) {
         }
       });
     }
-  });
+  };
+  fields::each_message(r, add);
+  if (faults) add(fields::Faults{}, fields::kFaultsChannel, r.faults);
   return out;
 }
 
@@ -182,6 +184,7 @@ Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other,
   const Verdict by_its_ticks = judge.verdict(false, false);
   out.verdict = log.end() ? Verdict::of(*log.end()) : by_its_ticks;
   out.verdict.numbers = by_its_ticks.numbers;
+  out.verdict.faults = by_its_ticks.faults;
   out.incomplete = log.incomplete_ticks();
   out.damaged_bytes = log.damaged_bytes();
   if (follower != nullptr) out.retuned = retuned;
@@ -228,8 +231,9 @@ nlohmann::json Retuned::Figures::json(std::int64_t ticks, double radius_m) const
 
 void compare(const runtime::TickRecord& logged, const runtime::TickRecord& replayed, Difference* difference) {
   if (difference->found) return;
-  const std::vector<Computed> was = computed(logged);
-  const std::vector<Computed> is = computed(replayed);
+  const bool faults = logged.faults.bound > 0.0;
+  const std::vector<Computed> was = computed(logged, faults);
+  const std::vector<Computed> is = computed(replayed, faults);
   for (std::size_t k = 0; k < is.size(); ++k) {
     const Computed& c = is[k];
     if (bits(was[k].value) == bits(c.value) || (std::isnan(was[k].value) && std::isnan(c.value))) continue;
@@ -270,7 +274,8 @@ VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept {
           r.arm_state == static_cast<std::int32_t>(ArmState::kArmed),
           r.reasons,
           tilt_rad,
-          reason_numbers(r)};
+          reason_numbers(r),
+          r.faults};
 }
 
 bool settled(const runtime::TickRecord& r) noexcept {

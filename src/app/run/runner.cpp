@@ -54,7 +54,7 @@ class TrialObserver {
   void operator()(std::int64_t tick, const runtime::TickRecord& t) noexcept {
     const auto arm_state = static_cast<ArmState>(t.arm_state);
     judge_.observe({static_cast<double>(tick) * kTickS, t.arm, arm_state == ArmState::kArmed, t.reasons,
-                    std::numeric_limits<double>::quiet_NaN(), reason_numbers(t)});
+                    std::numeric_limits<double>::quiet_NaN(), reason_numbers(t), t.faults});
     measure(t);
     record(tick, t);
     if (indicator_ != nullptr) indicator_->tell(arm_state, t.reasons, t.battery_V);
@@ -105,7 +105,8 @@ class TrialObserver {
   std::atomic<bool> done_{false};
 };
 
-/// Who commands, on stderr; nothing where a terminal or a pipe would have to be waited for.
+/// Who commands, and verdicts on sensors, on stderr; nothing where a terminal or a pipe would have to be
+/// waited for.
 void journal(const std::string& what) {
   const std::string line = "equipoise: " + what + "\n";
   struct stat about {};
@@ -193,6 +194,9 @@ runtime::TelemetryOptions Runner::telemetry_options(int number) const {
   options.min_free_bytes = a_.log_min_free_mb * 1000000;
   options.sync = on_board();
   options.wait_when_full = !on_board();  // an engine may run faster than the disk
+  options.watch = [verdicts = FaultVerdicts()](const runtime::TickRecord& t) mutable {
+    if (const auto said = verdicts.observe(0.0, t.faults)) journal(said->sentence());
+  };
   options.run = run_info(*robot_, a_.choice, a_.backend == "sim" ? static_cast<std::int64_t>(a_.seed) : 0);
   options.run.backend = a_.backend;
   options.run.board_toml = board_toml_;

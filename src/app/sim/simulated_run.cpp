@@ -60,7 +60,7 @@ void SimulatedRun::observe(std::int64_t tick, const runtime::TickRecord& t) {
   const double time_s = world_.time_s();
   if (options_.figures) measure(t, truth, time_s);
   judge_.observe({time_s, t.arm, t.arm_state == static_cast<std::int32_t>(ArmState::kArmed), t.reasons,
-                  truth.theta_rad.head<2>().norm(), reason_numbers(t)});
+                  truth.theta_rad.head<2>().norm(), reason_numbers(t), t.faults});
   if (lost()) done_ = true;
   if (observe_) {
     runtime::TickRecord record = t;

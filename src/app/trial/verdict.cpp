@@ -26,6 +26,7 @@ void VerdictJudge::lose(Ended how, const Tick& tick) noexcept {
 
 void VerdictJudge::observe(const Tick& tick) noexcept {
   verdict_.duration_s = tick.t_s;
+  verdict_.faults.observe(tick.t_s, tick.faults);
   if (lost_) return;
   verdict_.reasons = tick.reasons;
   armed_ = armed_ || tick.driven;
@@ -82,9 +83,12 @@ void Verdict::write(nlohmann::json* out) const {
   (*out)["reasons"] = reason_names(reasons);
   (*out)["fell"] = fell();
   (*out)["fell_at_s"] = fell() ? nlohmann::json(fell_at_s) : nlohmann::json(nullptr);
+  (*out)["verdicts"] = faults.json();
 }
 
 void print_reasons(std::FILE* out, const Verdict& verdict, const SafetyParams& limits) {
+  for (const FaultVerdict& each : verdict.faults)
+    std::fprintf(out, "  %.3f s  %s\n", each.t_s, each.sentence().c_str());
   if (!verdict.fell()) return;
   for (const std::string& line : reasons_explained(verdict.reasons, verdict.numbers, limits))
     std::fprintf(out, "  %s\n", line.c_str());

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "app/text/reasons.hpp"
+#include "app/trial/fault_verdict.hpp"
 #include "equipoise/runtime/record.hpp"
 
 namespace equipoise::app {
@@ -24,6 +25,7 @@ struct Verdict {
   double fell_at_s = 0.0;     // when it fell or was disarmed
   double duration_s = 0.0;
   ReasonNumbers numbers{};  // of the tick that `reasons` are of, where a tick was at hand
+  FaultVerdicts faults;     // of all ticks
 
   bool fell() const noexcept { return ended == Ended::kFell || ended == Ended::kDisarmed; }
   const char* name() const noexcept {
@@ -32,7 +34,7 @@ struct Verdict {
   }
   /// "Fell over at 3.20 s: tilt."
   std::string sentence() const;
-  /// Adds ended, reasons, fell, fell_at_s.
+  /// Adds ended, reasons, fell, fell_at_s, verdicts.
   void write(nlohmann::json* out) const;
 
   /// As in a log.
@@ -40,7 +42,7 @@ struct Verdict {
   static Verdict of(const runtime::EndRecord& record) noexcept;
 };
 
-/// A line for each reason of a run that did not end as asked.
+/// A line for each verdict on a sensor, and for each reason of a run that did not end as asked.
 void print_reasons(std::FILE* out, const Verdict& verdict, const SafetyParams& limits);
 
 class VerdictJudge {
@@ -55,6 +57,7 @@ class VerdictJudge {
     std::uint32_t reasons;
     double true_tilt_rad;  // NaN where nobody knows
     ReasonNumbers numbers{};
+    FaultEvidence faults{};
   };
   void observe(const Tick& tick) noexcept;
 

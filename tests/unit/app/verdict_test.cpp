@@ -80,6 +80,69 @@ TEST(Verdict, AFailedDeviceSaysSo) {
   EXPECT_EQ(out["fell"], false);
   EXPECT_TRUE(out["fell_at_s"].is_null());
   EXPECT_EQ(out["reasons"], nlohmann::json::array());
+  EXPECT_TRUE(out["verdicts"].is_null()) << "nothing was weighed";
+}
+
+constexpr std::int32_t row(std::string_view name) {
+  std::int32_t i = 0;
+  while (kFaultNames[static_cast<std::size_t>(i)] != name) ++i;
+  return i;
+}
+constexpr std::int32_t kFirst = row("encoder_1"), kSecond = row("encoder_2"), kBias = row("gyro_bias");
+
+std::vector<std::string> sentences(const Verdict& verdict) {
+  std::vector<std::string> out;
+  for (const FaultVerdict& each : verdict.faults) out.push_back(each.sentence());
+  return out;
+}
+
+TEST(Verdict, ASensorsIsListedWhenItIsTakenAndWhenItIsTakenBack) {
+  VerdictJudge judge;
+  const auto weighed = [&](double t_s, const FaultEvidence& e) {
+    judge.observe({t_s, true, true, 0, kUnknown, {}, e});
+  };
+  weighed(1.0, {kSecond, 17.0, 18.6, kFirst, 3.0, false, 0});
+  weighed(2.0, {kSecond, 21.44, 18.6, kFirst, 3.0, true, 1U << kSecond});
+  weighed(3.0, {kBias, 4.0, 18.6, -1, 0.0, false, 1U << kSecond});
+  weighed(4.0, {kSecond, 19.0, 18.6, -1, 0.0, true, 0});
+  nlohmann::json out;
+  judge.verdict(false, false).write(&out);
+  ASSERT_EQ(out["verdicts"].size(), 2U);
+  EXPECT_EQ(out["verdicts"][0], nlohmann::json({{"t_s", 2.0},
+                                                {"hypothesis", "encoder_2"},
+                                                {"taken", true},
+                                                {"ratio", 21.44},
+                                                {"bound", 18.6},
+                                                {"runner_up", "encoder_1"},
+                                                {"runner_up_ratio", 3.0}}));
+  EXPECT_EQ(out["verdicts"][1]["taken"], false);
+  EXPECT_TRUE(out["verdicts"][1]["runner_up"].is_null());
+  const auto lines = sentences(judge.verdict(false, false));
+  EXPECT_EQ(lines.at(0),
+            "verdict: encoder_2, log-likelihood ratio 21.4, bound 18.6, runner-up encoder_1 3.0");
+  EXPECT_EQ(lines.at(1),
+            "verdict taken back: encoder_2, log-likelihood ratio 19.0, bound 18.6, runner-up no fault 0.0");
+}
+
+TEST(Verdict, TwoOfOneTickLeaveTheSensorOpenAndTheTickThatLosesTheRobotCounts) {
+  VerdictJudge judge = balancing();
+  judge.observe({3.2, true, false, kImuUntrusted, 0.1, {}, {kFirst, 30.0, 18.6, kSecond, 28.0, true, 3U}});
+  judge.observe({3.3, true, false, kImuUntrusted, 0.1, {}, {-1, 0.0, 18.6, -1, 0.0, false, 3U}});
+  const Verdict v = judge.verdict(false, false);
+  EXPECT_TRUE(v.fell());
+  ASSERT_EQ(sentences(v).size(), 1U);
+  EXPECT_EQ(sentences(v)[0].substr(0, 33), "verdict: encoder_1 or encoder_2, ");
+}
+
+TEST(Verdict, OfMoreThanAListHoldsTheFirstAreKept) {
+  VerdictJudge judge;
+  for (int i = 0; i < 1000; ++i)
+    judge.observe(
+        {0.1 * i, true, true, 0, kUnknown, {}, {kBias, 20.0 + i, 18.6, -1, 0.0, true, 1U << kBias}});
+  const auto lines = sentences(judge.verdict(false, false));
+  EXPECT_GE(lines.size(), 16U);
+  EXPECT_LT(lines.size(), 1000U);
+  EXPECT_NE(lines.back().find("ratio " + std::to_string(lines.size() + 19)), std::string::npos);
 }
 
 }  // namespace
