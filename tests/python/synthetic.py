@@ -47,6 +47,7 @@ def write_log(
     robot: str = "mbbr",
     fall_at_s: float = math.inf,
     disarmed_at_s: float = math.inf,  # upright, for a stale IMU
+    faulty: tuple[float, float] | None = None,  # the second encoder, from, to; None: nothing is weighed
 ) -> Path:
     log = lcm.EventLog(str(path), "w", overwrite=True)
     run = _run(robot)
@@ -88,6 +89,15 @@ def write_log(
             "EQUIPOISE_HEALTH": health,
             "EQUIPOISE_TIMING": timing,
         }
+        if faulty:
+            faults = messages["EQUIPOISE_FAULTS"] = equipoise.faults_t()
+            faults.utime, faults.tick = utime, tick
+            faults.leading, faults.ratio, faults.bound = 1, 2.0, 18.6
+            faults.runner_up, faults.runner_up_ratio = -1, 0.0
+            faults.decided = tick in (round(at_s / TICK_S) for at_s in faulty)
+            faults.verdicts = 2 if faulty[0] <= t < faulty[1] else 0
+            if faults.decided:
+                faults.ratio, faults.runner_up, faults.runner_up_ratio = 21.44, 22, 3.0
         for channel, message in messages.items():
             log.write_event(utime, channel, message.encode())
     log.close()

@@ -221,6 +221,7 @@ def test_every_word_of_the_firmware_has_a_sentence():
     page = words.for_the_page()
     assert [word for word, _ in page["reasons"]] == list(names.SAFETY_REASONS)
     assert [word for word, _ in page["degraded"]] == list(names.DEGRADED)
+    assert page["faults"] == list(names.FAULTS_TABLE)
     assert dict(page["reasons"])["tilt"].endswith("limit: hold it upright before arming")
 
 

@@ -1,5 +1,6 @@
 """The cockpit as a person meets it: drives, faults, restarts, logs and parameters in a browser."""
 
+import math
 import os
 import shutil
 import signal
@@ -256,6 +257,26 @@ def test_history_is_bounded(page, cockpit):
           return [h.length, h.columns[0].length, t[0], t[t.length - 1], h.last()];
         }""")
     assert kept == [3000, 6000, 97000, 99999, 99999]
+
+
+def test_the_leading_ratio_is_plotted_against_its_bound(page, cockpit):
+    page.goto(cockpit.link)
+    until(lambda: shown(page, "cockpit.newest?.EQUIPOISE_FAULTS?.bound > 0"), "what the robot weighs comes")
+    title, columns = page.evaluate("""async () => {
+          const { Plots } = await import('/plots.js');
+          const plots = new Plots(document.createElement("div"));
+          plots.build("mip");
+          const state = (s) => ({ utime: 1e6 * s, theta_rad: [0, 0, 0], phi_dot_rad_s: [0, 0],
+            omega_B_rad_s: [0, 0, 0], normalized_innovation: 1 });
+          plots.add({ EQUIPOISE_STATE: state(1) }, 1);  // an older robot's
+          plots.add({ EQUIPOISE_STATE: state(2),
+            EQUIPOISE_FAULTS: { ratio: 21, runner_up_ratio: 3, bound: 18.6 } }, 1);
+          const { holder, columns } = plots.plots.at(-1);
+          return [holder.textContent, plots.history.view(columns).map((c) => Array.from(c))];
+        }""")
+    assert title.startswith("Fault evidence")
+    assert [column[1] for column in columns] == [2, 21, 3, 18.6]
+    assert all(math.isnan(column[0]) for column in columns[1:])
 
 
 def test_another_site_in_the_same_browser_is_kept_out(page, cockpit, tmp_path):

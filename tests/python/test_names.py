@@ -50,6 +50,12 @@ def test_the_troubleshooting_page_has_the_table_of_reasons(root):
         assert f"| `{row.name}` | {row.text} | {row.remedy} |" in page, row.name
 
 
+def test_hypotheses_follow_the_header():
+    assert names.FAULTS_TABLE[:2] == ("encoder_1", "encoder_2") and names.FAULTS_TABLE[-1] == "imu_noise"
+    assert len(set(names.FAULTS_TABLE)) == 4 + 4 + 6 + 3 + 3 + 6  # for four wheels
+    assert names.fault(20) == "gyro_bias" and names.fault(-1) == names.fault(99) == "no fault"
+
+
 def test_bits_without_a_word_are_named_by_number():
     assert names.bits(0b101, ("a", "b")) == ["a", "bit 2"]
     assert names.arm_state(9) == "state 9"

@@ -14,7 +14,8 @@ import pytest
 import synthetic
 from equipoise_robot.log import read_log
 from equipoise_tools import names, report
-from equipoise_tools.metrics import outcome, summarise
+from equipoise_tools.interactive import Run, plots_of
+from equipoise_tools.metrics import fault_events, outcome, summarise
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +58,31 @@ def test_the_permission_to_move_is_told_in_words(tmp_path):
     assert summary.fell_at_s == pytest.approx(8.0)
     assert outcome(summary) == "fell at 8.00 s: tilt"
     assert summary.events == [(0.0, "disarmed, not requested"), (0.5, "armed"), (8.0, "fault, tilt")]
+
+
+@pytest.fixture(scope="module")
+def judged_log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("judged") / "judged.lcm"
+    return read_log(synthetic.write_log(path, faulty=(3.0, 6.5)))
+
+
+def test_verdicts_on_sensors_are_events_with_their_numbers(judged_log, log):
+    said = "encoder_2, log-likelihood ratio 21.4, bound 18.6, runner-up spin 3.0"
+    verdicts = [(3.0, f"verdict: {said}"), (6.5, f"verdict taken back: {said}")]
+    assert fault_events(judged_log) == verdicts
+    assert [event for event in summarise(judged_log).events if "verdict" in event[1]] == verdicts
+    assert fault_events(log) == []  # an older one's
+
+
+def test_the_leading_ratio_is_drawn_against_its_bound(judged_log, log):
+    highest = {"leading": 21.44, "runner-up": 3.0, "bound": 18.6}
+    (plot,) = (p for p in plots_of(Run("", judged_log, summarise(judged_log)), False) if "Fault" in p.title)
+    assert {s.label: s.values.max() for s in plot.series} == highest
+    assert not any("Fault" in p.title for p in plots_of(Run("", log, summarise(log)), False))
+    figure = figures.draw_report(judged_log, summarise(judged_log))
+    (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left") == "Fault evidence")
+    assert {line.get_label(): max(line.get_ydata()) for line in axes.lines} == highest
+    figures.plt.close(figure)
 
 
 def test_a_disarmed_run_is_not_called_upright(tmp_path):

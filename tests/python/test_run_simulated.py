@@ -9,6 +9,8 @@ import pytest
 from equipoise_robot.log import read_log
 from equipoise_tools import metrics, names
 
+import lcm
+
 
 @pytest.fixture
 def equipoise(root):
@@ -51,6 +53,45 @@ def test_its_log_is_replayed_bit_for_bit(equipoise, tmp_path):
     faults = ["--fault", "count_jump@2", "--fault", "imu_off@3+0.5"]
     practised(equipoise, "edumip", "--duration-s", "4", "--speed", "100", "--log", log, *faults, code=1)
     assert json.loads(equipoise("replay", log, "--json", "-").stdout)["identical"] is True
+
+
+def test_verdicts_on_sensors_are_in_journal_log_and_replay(equipoise, root, tmp_path):
+    log = tmp_path / "verdicts.lcm"
+    options = ["--config", "config/mbbr.toml", "--backend", "sim", "--speed", "100", "--duration-s", "6"]
+    options += ["--fidelity", "built2025", "--drive-mps", "0.1", "--yaw-hz", "0.3", "--telemetry", "off"]
+    options += ["--fault", "encoder_dead@3+0.4", "--fault", "bias_jump@5"]
+    done = equipoise("run", *options, "--log", log, "--json", "-")
+    run = json.loads(done.stdout)
+    faults = [v for v in run["verdicts"] if v["hypothesis"] in ("encoder_1", "gyro_bias")]
+    assert [(v["hypothesis"], v["taken"]) for v in faults] == [
+        ("encoder_1", True),
+        ("encoder_1", False),
+        ("gyro_bias", True),
+    ]
+    for verdict in faults:
+        assert verdict["ratio"] > verdict["bound"]
+        assert verdict["ratio"] - verdict["runner_up_ratio"] >= 5.0
+    replayed = equipoise("replay", log, "--json", "-")
+    assert json.loads(replayed.stdout)["verdicts"] == run["verdicts"]
+    said = [what for _, what in metrics.fault_events(read_log(log))]
+    assert len(said) == len(run["verdicts"])
+    for line in said:  # the journal's, then the summary's; replay's
+        assert done.stderr.count(line) == 2 and replayed.stderr.count(line) == 1, line
+    assert f"equipoise: {said[0]}" in done.stderr
+
+
+def test_a_log_of_an_older_version_knows_no_verdicts(equipoise, tmp_path):
+    log = tmp_path / "new.lcm"
+    practised(equipoise, "edumip", "--duration-s", "2", "--speed", "100", "--log", log)
+    whole = json.loads(equipoise("replay", log, "--json", "-").stdout)
+    assert whole["verdicts"] == [] and names.FAULTS in read_log(log)
+    old = lcm.EventLog(str(tmp_path / "old.lcm"), "w")
+    for event in lcm.EventLog(str(log), "r"):
+        if event.channel != names.FAULTS:
+            old.write_event(event.timestamp, event.channel, event.data)
+    old.close()
+    replayed = json.loads(equipoise("replay", tmp_path / "old.lcm", "--json", "-").stdout)
+    assert replayed == whole | {"log": str(tmp_path / "old.lcm"), "verdicts": None}
 
 
 def test_a_fault_strikes_when_asked_for(equipoise):

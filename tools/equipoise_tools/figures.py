@@ -206,6 +206,18 @@ class Report:
         legend_beside_title(axes, count)
         self.finish_time_axis(axes)
 
+    def evidence(self, axes: plt.Axes) -> None:
+        faults, t_s = self.log[names.FAULTS], self.log.seconds(names.FAULTS)
+        for field, label, colour in (
+            ("runner_up_ratio", "runner-up", style.colour(2)),
+            ("ratio", "leading", style.ESTIMATE),
+            ("bound", "bound", style.REFERENCE),
+        ):
+            axes.plot(t_s, faults[field], color=colour, lw=0.8, label=label)
+        axes.set(title="Fault evidence", ylabel="nats", ylim=(-5, 1.6 * float(faults["bound"].max())))
+        legend_beside_title(axes, 3)
+        self.finish_time_axis(axes)
+
     def errors(self, what: str, title: str, unit: str, scale: float) -> Panel:
         def draw(axes: plt.Axes) -> None:
             for index, (name, errors) in enumerate(self.summary.estimators.items()):
@@ -252,6 +264,8 @@ class Report:
             panels += [self.track]
         if names.MOTORS in log:
             panels += [self.duties]
+        if names.FAULTS in log:
+            panels += [self.evidence]
         if self.summary.estimators:
             panels += [self.errors("attitude_rad", "Attitude error, smoothed", "mrad", 1000)]
             rolling = "Ball" if self.axes_count == 2 else "Wheel"

@@ -115,6 +115,13 @@ def plots_of(run: Run, compared: bool) -> list[Plot]:
         else:
             series = [Series(f"motor {i + 1}", t_s, duty[:, i], style.colour(i)) for i in range(count)]
         plots.append(Plot("Duty", "of full", series))
+    if names.FAULTS in log:
+        faults, t_s = log[names.FAULTS], log.seconds(names.FAULTS)
+        series = [Series("leading", t_s, faults["ratio"], style.ESTIMATE)]
+        if not compared:
+            series.append(Series("runner-up", t_s, faults["runner_up_ratio"], style.colour(2)))
+            series.append(Series("bound", t_s, faults["bound"], style.REFERENCE, True))
+        plots.append(Plot("Fault evidence, log-likelihood ratio", "nats", series))
     if not compared and run.summary.estimators:
         errors = run.summary.estimators.items()
         plots.append(

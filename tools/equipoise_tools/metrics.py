@@ -143,6 +143,26 @@ def safety_events(log: Log) -> list[tuple[float, str]]:
     return events
 
 
+def fault_events(log: Log) -> list[tuple[float, str]]:
+    """Verdicts on sensors, as src/app/trial/fault_verdict.cpp says them."""
+    if names.FAULTS not in log:
+        return []
+    faults, t_s = log[names.FAULTS], log.seconds(names.FAULTS)
+    events = []
+    for i in np.flatnonzero(faults["decided"]):
+        f, before = faults[i], int(faults["verdicts"][i - 1]) if i else 0
+        now, leading, runner_up = int(f["verdicts"]), int(f["leading"]), int(f["runner_up"])
+        found = now & ~before
+        who = names.fault(leading)
+        if runner_up >= 0 and found >> leading & 1 and found >> runner_up & 1:
+            who += f" or {names.fault(runner_up)}"
+        said = f"{'verdict taken back' if before & ~now else 'verdict'}: {who}"
+        said += f", log-likelihood ratio {f['ratio']:.1f}, bound {f['bound']:.1f}"
+        said += f", runner-up {names.fault(runner_up)} {f['runner_up_ratio']:.1f}"
+        events.append((float(t_s[i]), said))
+    return events
+
+
 def alarms_of(log: Log) -> list[tuple[float, str, int]] | None:
     """What was excluded, and what spoke against the motors once they had run."""
     if names.HEALTH not in log:
@@ -278,7 +298,7 @@ def summarise(log: Log) -> Summary:
             counted = (truth["utime"] - log.start_utime) * 1e-6 >= SETTLE_S
             miss = truth["position_W_m"][counted] - reference["position_W_m"][counted]
             summary.position_rmse_m = rms(np.linalg.norm(miss, axis=1)) if miss.size else None
-    summary.events = safety_events(log)
+    summary.events = sorted(safety_events(log) + fault_events(log))
     summary.alarms = alarms_of(log)
     if names.HEALTH in log and names.STATE in log:
         state, health = aligned(log, names.STATE, names.HEALTH)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from equipoise_robot.channels import (
     COMMAND,
+    FAULTS,
     HEALTH,
     MOTORS,
     REFERENCE,
@@ -20,6 +21,7 @@ from equipoise_robot.channels import (
 
 __all__ = [
     "COMMAND",
+    "FAULTS",
     "HEALTH",
     "MOTORS",
     "REFERENCE",
@@ -47,7 +49,8 @@ SENSOR_HEALTH = (
     "bridge fault",
     "battery error",
 )
-_TABLE = Path(__file__).resolve().parents[2] / "src" / "app" / "text" / "reasons.cpp"
+_ROOT = Path(__file__).resolve().parents[2]
+_TABLE = _ROOT / "src" / "app" / "text" / "reasons.cpp"
 _ROW = re.compile(
     r'\{\s*k\w+,\s*"(?P<name>\w+)",\s*(?P<text>(?:"[^"]*"\s*)+),\s*(?P<remedy>(?:"[^"]*"\s*)+)[,}]'
 )
@@ -81,11 +84,18 @@ SAFETY_TABLE = _rows("safety_reasons")
 DEGRADED_TABLE = _rows("degraded_modes")
 SAFETY_REASONS = tuple(reason.word for reason in SAFETY_TABLE)
 DEGRADED = tuple(mode.word for mode in DEGRADED_TABLE)
+# What the fault detector weighs, by row and by bit.
+_HYPOTHESES = (_ROOT / "include/equipoise/estimate/fault_hypotheses.hpp").read_text()
+FAULTS_TABLE = tuple(re.findall(r'"(\w+)"', _HYPOTHESES.split("kFaultNames{", 1)[1].split("}", 1)[0]))
 
 
 def bits(value: int, words: tuple[str, ...]) -> list[str]:
     """The words for the bits that are set; a bit without a word is named by its number."""
     return [words[i] if i < len(words) else f"bit {i}" for i in range(32) if value >> i & 1]
+
+
+def fault(row: int) -> str:
+    return FAULTS_TABLE[row] if 0 <= row < len(FAULTS_TABLE) else "no fault"
 
 
 def arm_state(value: int) -> str:

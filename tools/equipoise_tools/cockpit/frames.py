@@ -23,6 +23,7 @@ CHANNELS = {
     names.TRUTH: "state_t",
     names.MOTORS: "motors_t",
     names.TIMING_HISTOGRAM: "timing_histogram_t",
+    names.FAULTS: "faults_t",
     names.HEALTH: "health_t",
     names.TIMING: "timing_t",
 }

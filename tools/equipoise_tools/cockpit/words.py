@@ -16,4 +16,5 @@ def for_the_page() -> dict[str, list]:
         "reasons": rows(names.SAFETY_TABLE),
         "sensor_health": [[word, word] for word in names.SENSOR_HEALTH],
         "degraded": rows(names.DEGRADED_TABLE),
+        "faults": list(names.FAULTS_TABLE),
     }

@@ -88,7 +88,8 @@ function note(frame) {
   if (!health || !words) return;
   const said = [words.arm_states[health.arm_state] ?? `state ${health.arm_state}`,
     ...bits(health.reasons, words.reasons).map(([word]) => word), ...bits(health.sensor_health, words.sensor_health).map(([word]) => word),
-    ...bits(health.degraded, words.degraded).map(([word]) => word)].join(", ");
+    ...bits(health.degraded, words.degraded).map(([word]) => word),
+    ...bits(frame.EQUIPOISE_FAULTS?.verdicts, words.faults).map((word) => `verdict: ${word}`)].join(", ");
   if (said === shownEvent) return;
   shownEvent = said;
   const item = document.createElement("li");

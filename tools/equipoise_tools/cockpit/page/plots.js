@@ -29,7 +29,7 @@ export class History {
 }
 
 const SIGNALS = { t: 0, tiltX: 1, tiltY: 2, refX: 3, refY: 4, speedX: 5, speedY: 6, refSpeedX: 7, refSpeedY: 8,
-  yaw: 9, wantedYaw: 10, duty0: 11, duty1: 12, duty2: 13, duty3: 14, battery: 15, nis: 16 };
+  yaw: 9, wantedYaw: 10, duty0: 11, duty1: 12, duty2: 13, duty3: 14, battery: 15, nis: 16, ratio: 17, runnerUp: 18, bound: 19 };
 
 /** cm/s, forward and to the left of the nose: a ball that rolls about y goes along x. */
 const speeds = { mbbr: (s, radius) => [100 * radius * s.phi_dot_rad_s[1], -100 * radius * s.phi_dot_rad_s[0]],
@@ -37,15 +37,17 @@ const speeds = { mbbr: (s, radius) => [100 * radius * s.phi_dot_rad_s[1], -100 *
 
 function row(frame, robot, radius) {
   const s = frame.EQUIPOISE_STATE, r = frame.EQUIPOISE_REFERENCE, m = frame.EQUIPOISE_MOTORS;
-  const c = frame.EQUIPOISE_COMMAND, h = frame.EQUIPOISE_HEALTH;
+  const c = frame.EQUIPOISE_COMMAND, h = frame.EQUIPOISE_HEALTH, f = frame.EQUIPOISE_FAULTS;
   const state = (x, f) => (x ? f(x) : NaN);
   const speed = (x) => (x ? (speeds[robot] ?? speeds.mbbr)(x, radius) : [NaN, NaN]);
   return [s.utime * 1e-6, deg(s.theta_rad[0]), deg(s.theta_rad[1]), state(r, (x) => deg(x.theta_rad[0])),
     state(r, (x) => deg(x.theta_rad[1])), ...speed(s), ...speed(r),
     turns(s.omega_B_rad_s[2]), state(c, (x) => turns(x.yaw_rate_rad_s)),
-    ...[0, 1, 2, 3].map((i) => (m && i < m.motors ? m.duty[i] : NaN)), h ? h.battery_V : NaN, s.normalized_innovation];
+    ...[0, 1, 2, 3].map((i) => (m && i < m.motors ? m.duty[i] : NaN)), h ? h.battery_V : NaN, s.normalized_innovation,
+    ...(f ? [f.ratio, f.runner_up_ratio, f.bound] : [NaN, NaN, NaN])];
 }
 
+const FAULTS = ["Fault evidence, log-likelihood ratio (nats)", ["ratio", "leading", "blue"], ["runnerUp", "runner-up", "green"], ["bound", "bound", "red", [4, 3]]];
 const PANELS = {
   mbbr: [
     ["Tilt (deg)", ["tiltX", "about x", "blue"], ["tiltY", "about y", "green"], ["refX", "wanted x", "red", [4, 3]], ["refY", "wanted y", "yellow", [4, 3]]],
@@ -53,6 +55,7 @@ const PANELS = {
     ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "asked for", "red", [4, 3]]],
     ["Duty", ["duty0", "motor 1", "blue"], ["duty1", "motor 2", "green"], ["duty2", "motor 3", "pink"]],
     ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"]],
+    FAULTS,
   ],
   mip: [
     ["Lean (deg)", ["tiltX", "lean", "blue"], ["refX", "wanted", "red", [4, 3]]],
@@ -60,6 +63,7 @@ const PANELS = {
     ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "asked for", "red", [4, 3]]],
     ["Duty", ["duty0", "motor 1", "blue"], ["duty1", "motor 2", "green"]],
     ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"]],
+    FAULTS,
   ],
 };
 
