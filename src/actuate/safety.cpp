@@ -1,8 +1,9 @@
 #include "equipoise/actuate/safety.hpp"
-#include "equipoise/actuate/degraded.hpp"
 
 #include <algorithm>
 #include <cmath>
+
+#include "equipoise/actuate/degraded.hpp"
 
 namespace equipoise {
 namespace {
