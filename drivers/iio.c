@@ -125,8 +125,8 @@ int iio_set_range(const iio_device_t* device, const char* kind, double range, do
 }
 
 static bool is_rotation(const double r[9]) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i; j < 3; ++j) {
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = i; j < 3; ++j) {
       const double dot = r[3 * i] * r[3 * j] + r[3 * i + 1] * r[3 * j + 1] + r[3 * i + 2] * r[3 * j + 2];
       if (!(fabs(dot - (i == j ? 1.0 : 0.0)) < 1e-3)) return false;
     }
@@ -253,7 +253,7 @@ static int set_trigger(const iio_device_t* device, const char* trigger, iio_faul
   const char* file = "trigger/current_trigger";
   if (!has_file(device, file)) return 0; /* its interrupt fills the buffer without one */
   int status = trigger[0] != '\0' ? write_text(device, file, trigger, fault) : 0;
-  char text[TEXT_MAX];
+  char text[TEXT_MAX] = "";
   if (status == 0) status = read_text(device, file, text, fault);
   if (status < 0 || text[0] != '\0') return status;
   return fail(fault, -ENODATA, device->name, file, text,

@@ -137,7 +137,7 @@ static void counts_of(const iio_device_t* device, int first, const uint8_t* scan
     const int64_t end = iio_end_value(channel);
     if (raw[i] >= end || raw[i] <= -end - 1) *clipped = true;
   }
-  for (int i = 0; i < 3; ++i)
+  for (size_t i = 0; i < 3; ++i)
     counts[i] = matrix[3 * i] * raw[0] + matrix[3 * i + 1] * raw[1] + matrix[3 * i + 2] * raw[2];
 }
 

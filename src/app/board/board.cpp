@@ -56,6 +56,7 @@ void read_part(Section& s, bbb_imu_t* imu) {
   const bool iio = imu->driver == BBB_IMU_IIO;
   if (iio) {
     std::vector<std::string> names;
+    names.reserve(IMU_PARTS);
     for (int i = 0; i < IMU_PARTS; ++i) names.emplace_back(imu_part(i)->name);
     imu->part = static_cast<int>(s.choice("part", names));
   }
