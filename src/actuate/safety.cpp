@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "equipoise/actuate/degraded.hpp"
-
 namespace equipoise {
 namespace {
 
@@ -80,7 +78,7 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   // A reversed encoder surprises the estimator, too: the check that can name the wheel goes first.
   surprised_ = count(surprised_,
                      in.encoders_in_check || !(innovation_ > (unhealthy_ ? 0.5 : 1.0) * p_.max_innovation));
-  const int patience = (left_out_ & ~kWithoutGyroAxis) != 0 ? kLeftOutTicks : ticks(p_.max_innovation_s);
+  const int patience = left_out_ != 0 ? kLeftOutTicks : ticks(p_.max_innovation_s);
   unhealthy_ = surprised_ > (unhealthy_ ? 0 : patience);
   falling_ = count(falling_, !(in.imu_ok && in.accel_m_s2 < kFreeFall_m_s2));
   const double fastest =
