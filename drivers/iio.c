@@ -271,7 +271,7 @@ int iio_start(iio_device_t* device, const char* trigger, iio_fault_t* fault) {
     status = write_text(device, "buffer/watermark", "1", fault);
   if (status == 0) status = set_trigger(device, trigger, fault);
   if (status == 0) status = write_text(device, "buffer/enable", "1", fault);
-  char text[TEXT_MAX];
+  char text[TEXT_MAX] = "";
   if (status == 0) status = read_text(device, "buffer/enable", text, fault);
   if (status < 0 || strcmp(text, "1") == 0) return status;
   return fail(fault, -EIO, device->name, "buffer/enable", text, "the buffer does not start: dmesg says why");
