@@ -6,10 +6,8 @@ the robot's own clock. A covariance of zeros is ROS's word for unknown; the filt
 
 from __future__ import annotations
 
-import argparse
 import heapq
 import math
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +18,7 @@ from numpy.typing import NDArray
 
 from . import _core, models
 from . import channels as ch
+from ._convert import convert
 from ._data import need
 from .errors import UserError
 from .log import Log
@@ -243,21 +242,7 @@ def write(log: Log, folder: str | Path) -> dict[str, int]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m equipoise_robot.rosbag2", description=__doc__)
-    parser.add_argument("log", metavar="LOG", type=Path, help="an LCM event log written by equipoise")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="folder to make (default: beside the log)")
-    given = parser.parse_args(arguments)
-    out = given.out or given.log.with_suffix(".rosbag2")
-    try:
-        log = Log(given.log)
-        counts = write(log, out)
-    except (UserError, OSError, ModuleNotFoundError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    for note in log.notes:
-        print(f"note: {note}")
-    print(f"{out}: {', '.join(f'{topic} {count}' for topic, count in counts.items() if count)}")
-    return 0
+    return convert("rosbag2", __doc__, write, arguments)
 
 
 if __name__ == "__main__":

@@ -231,29 +231,31 @@ std::int64_t write_mcap(const std::string& path, std::ostream& out) {
 
 /// Becomes the Python package's converter: in the interpreter of the build, if this is one, else the user's.
 [[noreturn]] void convert_in_python(const ConvertArguments& a) {
-  constexpr const char* kProgram = R"(import sys
+  constexpr const char* kProgram = R"(import importlib, sys
 sys.path[:] = [folder for folder in sys.path if folder]  # nothing from where the user happens to be
+to, extra = sys.argv.pop(1), sys.argv.pop(1)
 try:
-    from equipoise_robot.rosbag2 import main
+    main = importlib.import_module("equipoise_robot." + to).main
 except ModuleNotFoundError as error:
-    install = "in a clone of Equipoise: pip install '.[ros]'"
-    print(f"error: --to rosbag2 needs the Python module {error.name}; {install}", file=sys.stderr)
+    install = f"in a clone of Equipoise: pip install '.[{extra}]'"
+    print(f"error: --to {to} needs the Python module {error.name}; {install}", file=sys.stderr)
     sys.exit(2)
 sys.exit(main()))";
   const std::filesystem::path own =
       std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() / "venv/bin/python";
   const std::string python = std::filesystem::exists(own) ? own.string() : "python3";
-  std::vector<const char*> arguments{python.c_str(), "-c", kProgram, a.log.c_str()};
+  const char* const extra = a.to == "rosbag2" ? "ros" : a.to.c_str();  // of pyproject.toml
+  std::vector<const char*> arguments{python.c_str(), "-c", kProgram, a.to.c_str(), extra, a.log.c_str()};
   if (!a.out.empty()) arguments.insert(arguments.end(), {"--out", a.out.c_str()});
   arguments.push_back(nullptr);
   execvp(python.c_str(), const_cast<char* const*>(arguments.data()));
-  throw InputError(python + ": " + std::strerror(errno) + "; --to rosbag2 needs Python 3");
+  throw InputError(python + ": " + std::strerror(errno) + "; --to " + a.to + " needs Python 3");
 }
 
 int convert(ConvertArguments a) {
   TickRecord first;
   if (!RunLog(a.log).next(&first)) throw InputError(a.log + ": holds no whole tick");
-  if (a.to == "rosbag2") convert_in_python(a);
+  if (a.to == "rosbag2" || a.to == "lerobot") convert_in_python(a);
   if (a.out.empty()) a.out = std::filesystem::path(a.log).replace_extension(a.to).string();
   for (const std::string& part : runtime::existing_log_parts(a.log)) {
     std::error_code ignored;
@@ -275,9 +277,10 @@ void add_convert(Subcommand app) {
                                  .example("equipoise convert logs/latest/run.lcm --to mcap");
   auto a = std::make_shared<ConvertArguments>();
   command.option("log", a->log, "LCM event log of sim or run; its further parts are found").file().required();
-  command.option("--to", a->to, "mcap (Foxglove), csv or rosbag2 (ROS 2; a folder)")
+  command
+      .option("--to", a->to, "mcap (Foxglove), csv, rosbag2 (ROS 2; a folder) or lerobot (LeRobot; a folder)")
       .required()
-      .one_of({"mcap", "csv", "rosbag2"});
+      .one_of({"mcap", "csv", "rosbag2", "lerobot"});
   command.option("--out", a->out, "where to (default: beside the log)").file();
   command.action([=] { return convert(*a); });
 }

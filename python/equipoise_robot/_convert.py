@@ -1,0 +1,31 @@
+"""The command line of a converter: LOG and --out DIR."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from .errors import UserError
+from .log import Log
+
+
+def convert(
+    to: str, about: str | None, write: Callable[[Log, Path], dict[str, int]], arguments: list[str] | None
+) -> int:
+    parser = argparse.ArgumentParser(prog=f"python -m equipoise_robot.{to}", description=about)
+    parser.add_argument("log", metavar="LOG", type=Path, help="an LCM event log written by equipoise")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="folder to make (default: beside the log)")
+    given = parser.parse_args(arguments)
+    out = given.out or given.log.with_suffix(f".{to}")
+    try:
+        log = Log(given.log)
+        counts = write(log, out)
+    except (UserError, OSError, ModuleNotFoundError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    for note in log.notes:
+        print(f"note: {note}")
+    print(f"{out}: {', '.join(f'{name} {count}' for name, count in counts.items() if count)}")
+    return 0
