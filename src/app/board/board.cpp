@@ -14,7 +14,7 @@ using config::Section;
 
 using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-constexpr int kMaxLine = 31;  // a GPIO bank of the AM335x has 32 lines
+constexpr int kMaxLine = 91;  // the AM62's main_gpio0 has 92 lines, a bank of the AM335x 32
 
 void copy_text(Section& s, const std::string& key, char* to, std::size_t size) {
   const std::string value = s.text(key);
