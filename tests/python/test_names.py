@@ -44,12 +44,6 @@ def test_the_table_of_reasons_has_a_row_with_a_remedy_for_each_bit(root, header,
     assert all(len(row.text) > 8 and len(row.remedy) > 8 for row in table)
 
 
-def test_the_troubleshooting_page_has_the_table_of_reasons(root):
-    page = (root / "docs" / "troubleshooting.md").read_text()
-    for row in (*names.SAFETY_TABLE, *names.DEGRADED_TABLE):
-        assert f"| `{row.name}` | {row.text} | {row.remedy} |" in page, row.name
-
-
 def test_hypotheses_follow_the_header():
     assert names.FAULTS_TABLE[:2] == ("encoder_1", "encoder_2") and names.FAULTS_TABLE[-1] == "imu_noise"
     assert len(set(names.FAULTS_TABLE)) == 4 + 4 + 6 + 3 + 3 + 6  # for four wheels

@@ -8,7 +8,6 @@ import sys
 
 import pytest
 import yaml
-from equipoise_tools.names import DEGRADED_TABLE, SAFETY_TABLE
 from equipoise_tools.site_hooks import without_outer_links
 
 
@@ -72,14 +71,6 @@ def test_links_out_of_the_docs_become_names():
     assert without_outer_links("[f](../filter.md) [g](../../g)", "tutorials/t.md") == "[f](../filter.md) `g`"
     assert without_outer_links("```sh laptop\nls\n```", "page.md") == "```sh\nls\n```"
     assert without_outer_links("```\n[x](../y)\n```", "page.md") == "```\n[x](../y)\n```"
-
-
-def test_every_message_is_in_troubleshooting(root):
-    page = (root / "docs/troubleshooting.md").read_text()
-    names = [row.name for row in (*SAFETY_TABLE, *DEGRADED_TABLE)]
-    assert len(names) > 35
-    numbered = {f"without_wheel_{i}" for i in (2, 3)}  # "without_wheel_1 to without_wheel_4"
-    assert [name for name in names if f"`{name}`" not in page and name not in numbered] == []
 
 
 def test_the_citation_file_says_what_the_project_says(root):

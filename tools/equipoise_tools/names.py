@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from equipoise_robot.channels import (
@@ -54,6 +55,7 @@ _TABLE = _ROOT / "src" / "app" / "text" / "reasons.cpp"
 _ROW = re.compile(
     r'\{\s*k\w+,\s*"(?P<name>\w+)",\s*(?P<text>(?:"[^"]*"\s*)+),\s*(?P<remedy>(?:"[^"]*"\s*)+)[,}]'
 )
+_LIMIT = re.compile(r'\{When::\w+, "(?P<what>[^"]*)", "[^"]*", \w+, &SafetyParams::(?P<key>\w+)')
 
 
 @dataclass(frozen=True)
@@ -63,25 +65,30 @@ class Reason:
     name: str
     text: str
     remedy: str
+    limits: tuple[tuple[str, str], ...] = ()  # (value that is shown, key of its limit)
 
     @property
     def word(self) -> str:
         return self.name.replace("_", " ")
 
 
-def _rows(function: str) -> tuple[Reason, ...]:
-    """Bit by bit."""
-    body = _TABLE.read_text().split(f"& {function}() {{", 1)[1].split("return rows;", 1)[0]
+def rows_of(source: str, function: str) -> tuple[Reason, ...]:
+    """Of the table that a function in reasons.cpp returns, bit by bit."""
+    body = source.split(f"& {function}() {{", 1)[1].split("return rows;", 1)[0]
+    found = list(_ROW.finditer(body))
+    ends = [match.start() for match in found] + [len(body)]
     return tuple(
         Reason(
-            match["name"], *("".join(re.findall(r'"([^"]*)"', match[part])) for part in ("text", "remedy"))
+            match["name"],
+            *("".join(re.findall(r'"([^"]*)"', match[part])) for part in ("text", "remedy")),
+            tuple((limit["what"], f"safety.{limit['key']}") for limit in _LIMIT.finditer(body[begin:end])),
         )
-        for match in _ROW.finditer(body)
+        for match, (begin, end) in zip(found, pairwise(ends), strict=True)
     )
 
 
-SAFETY_TABLE = _rows("safety_reasons")
-DEGRADED_TABLE = _rows("degraded_modes")
+SAFETY_TABLE = rows_of(_TABLE.read_text(), "safety_reasons")
+DEGRADED_TABLE = rows_of(_TABLE.read_text(), "degraded_modes")
 SAFETY_REASONS = tuple(reason.word for reason in SAFETY_TABLE)
 DEGRADED = tuple(mode.word for mode in DEGRADED_TABLE)
 # What the fault detector weighs, by row and by bit.

@@ -1,5 +1,5 @@
 // Why the motors are off and what the robot does without, in words and numbers: one row each, which the
-// terminal, the log's pages, the cockpit (tools/equipoise_tools/names.py) and docs/troubleshooting.md read.
+// terminal, the log's pages, the cockpit (tools/equipoise_tools/names.py) and docs/reasons.md read.
 // In: bits of SafetyReason or DegradedBit, the tick that gave them -> out: names, sentences.
 #pragma once
 

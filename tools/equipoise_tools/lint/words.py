@@ -31,7 +31,7 @@ TERMS = tuple(
     )
 )  # fmt: skip
 UNREVISED = ("docs/faults.md",)  # is rewritten with the detector
-GENERATED = ("docs/experiments/", "docs/reports/", "docs/parameters.md")
+GENERATED = ("docs/experiments/", "docs/reports/", "docs/parameters.md", "docs/reasons.md")
 _CODE = re.compile(r"```.*?```|`[^`\n]*`|\]\([^)\s]*\)|<!--.*?-->", re.S)
 
 
