@@ -20,6 +20,8 @@ _LINE = re.compile(r"([\w./-]+\.(?:py|cpp|hpp|h|c|toml|md)):(\d+)")
 _NUMBER_LINK = re.compile(
     r"\[([^\]]*\d[^\]]*)\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)"
 )
+_CITED = re.compile(r"\[[^\]]*\]\(((?:\.\./|docs/)*reports/[\w./-]+\.md)(?:#[\w-]+)?\)")
+_BARE = re.compile(r"[\w-]+\.(?:py|cpp|hpp)")  # a source without its folder
 MADE_BY_BUILD = ("build/", "logs/")
 OF_DEBIAN = ("/", "~")
 
@@ -35,15 +37,19 @@ def help_of(command: tuple[str, ...]) -> str | None:
 
 
 def code_of(text: str) -> list[tuple[int, str]]:
-    """(line, code) of every inline code and line of a shell block."""
+    """(line, code) of every inline code, which may be wrapped, and line of a shell block."""
     found, shell = [], False
+    outside: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):
-        if line.startswith("```"):
+        fence = line.startswith("```")
+        if fence:
             shell = bool(re.match(r"```(sh|bash)\b", line))
         elif shell:
             found.append((number, re.sub(r"\s+#.*", "", line)))
-        else:
-            found += [(number, code) for code in re.findall(r"`([^`\n]+)`", line)]
+        outside.append("" if fence or shell else line)
+    prose = "\n".join(outside)
+    for code in re.finditer(r"`((?:[^`\n]|\n(?!\s*\n))+)`", prose):
+        found.append((prose.count("\n", 0, code.start()) + 1, " ".join(code[1].split())))
     return found
 
 
@@ -112,6 +118,11 @@ def wrong_keys(code: str) -> list[str]:
     return found
 
 
+@cache
+def sources(root: Path) -> frozenset[str]:
+    return frozenset(Path(name).name for name in tree_of_git(root).files)
+
+
 def wrong_paths(root: Path, page: Path, code: str) -> list[str]:
     found = []
     for path in _PATH.findall(code if not code.startswith((*OF_DEBIAN, *MADE_BY_BUILD)) else ""):
@@ -128,6 +139,13 @@ def wrong_paths(root: Path, page: Path, code: str) -> list[str]:
             for base in (root, page.parent, root / "config", root / "src", root / "include/equipoise")
         ):
             found.append(f"no file {path}")
+    if (
+        _BARE.fullmatch(code)
+        and "NAME" not in code
+        and code not in sources(root)
+        and not (page.parent / code).exists()
+    ):
+        found.append(f"no file {code}")
     return found
 
 
@@ -150,15 +168,32 @@ def wrong_tests(root: Path, text: str) -> list[str]:
     return found
 
 
+def numbers_before(text: str, end: int) -> list[str]:
+    """Those of the sentence, list item or table cell that a link ends."""
+    begin = max(text.rfind(mark, 0, end) for mark in ("\n\n", "\n- ", "| ", "\n#"))
+    sentence = re.split(r"(?<=[.:;])\s+(?=[A-Z])", text[max(begin, 0) : end])[-1]
+    plain = re.sub(r"`[^`]*`|\]\([^)]*\)", " ", sentence)
+    return re.findall(r"(?<![\w.\[(-])\d+(?:\.\d+)?(?!\w)", plain)
+
+
 def wrong_quotes(page: Path, text: str) -> list[str]:
-    """A link to a report whose words have numbers: each must be in that report."""
+    """Numbers in a link to a report, or in the sentence that cites one, stand together in a section of it."""
+    quotes = [(re.findall(r"\d+(?:\.\d+)?", said), link) for said, link in _NUMBER_LINK.findall(text)]
+    quotes += [(numbers_before(text, m.start()), m[1]) for m in _CITED.finditer(text)]
     found = []
-    for said, link in _NUMBER_LINK.findall(text):
+    for numbers, link in quotes:
         report = (page.parent / link).resolve()
-        told = report.read_text() if report.is_file() else ""
-        for number in re.findall(r"\d+(?:\.\d+)?", said):
-            if not re.search(rf"(?<![\d.]){re.escape(number)}(?![\d]|\.\d)", told):
-                found.append(f"{link} does not say {number}")
+        told = re.sub(
+            r"\([\d.]+ ?- ?[\d.]+\)", "", report.read_text() if report.is_file() else ""
+        )  # no intervals
+        sections = re.split(r"^## ", told, flags=re.M)
+        missing = [
+            [n for n in numbers if not re.search(rf"(?<![\d.]){re.escape(n)}(?![\d]|\.\d)", section)]
+            for section in sections
+        ]
+        least = min(missing, key=len)
+        if least:
+            found.append(f"{link} does not say {', '.join(least)} in one section")
     return found
 
 
@@ -190,9 +225,13 @@ def test_what_pages_name_exists(root):
         ("`equipoise simulate --log x`", "no command equipoise simulate"),
         ("set `safety.max_lean_rad` lower", "no configuration key safety.max_lean_rad"),
         ("see `config/robot.toml`", "no file config/robot.toml"),
+        ("see `test_nothing_at_all.py`", "no file test_nothing_at_all.py"),
+        ("run `./tools/campaign\n  --robotz 3`", "has no --robotz"),
         ("at src/app/main.cpp:99999", "no line src/app/main.cpp:99999"),
         ("`test_links.py::test_that_is_not_there`", "no test test_links.py::test_that_is_not_there"),
         ("[0.00777 rad](reports/as-built.md)", "does not say 0.00777"),
+        ("- Of 987 robots all stood\n  ([report](reports/as-built.md)).", "does not say 987"),
+        ("| robots | 77.7 % of 1000 ([report](reports/as-built.md)) |", "does not say 77.7"),
         (
             "`equipoise sim --yaw-hz 3`, `safety.max_tilt_rad`, `config/mbbr.toml`, CMakeLists.txt:1\n"
             "[0.0076 rad](reports/as-built.md) `test_links.py::test_every_link_leads_somewhere`",
