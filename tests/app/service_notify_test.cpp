@@ -7,8 +7,11 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstring>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -65,6 +68,30 @@ TEST_F(Manager, HearsALoopThatTicksAndNotOneThatHangs) {
     EXPECT_TRUE(heard().empty()) << "a loop that hangs is not kept alive";
   }
   EXPECT_EQ(heard(), std::vector<std::string>{"STOPPING=1"});
+}
+
+TEST_F(Manager, IsFoundUnderANameWithoutAFile) {
+  const std::string name = std::string(1, '\0') + "equipoise-test-" + std::to_string(getpid());
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, name.data(), name.size());
+  const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size());
+  ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), size), 0);
+  setenv("NOTIFY_SOCKET", ("@" + name.substr(1)).c_str(), 1);  // as sd_notify(3) writes it
+  notify_service_manager("READY=1");
+  char text[100];
+  const ssize_t length = recv(fd, text, sizeof text, 0);
+  EXPECT_EQ(std::string(text, static_cast<std::size_t>(std::max<ssize_t>(length, 0))), "READY=1");
+  close(fd);
+}
+
+TEST_F(Manager, ThatIsNotThereOrHasTooLongANameIsNotToldAnything) {
+  unsetenv("NOTIFY_SOCKET");
+  notify_service_manager("READY=1");
+  setenv("NOTIFY_SOCKET", std::string(1000, 'x').c_str(), 1);
+  notify_service_manager("READY=1");
+  EXPECT_TRUE(heard().empty());
 }
 
 }  // namespace
