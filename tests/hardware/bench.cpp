@@ -60,6 +60,7 @@ void unexportAll() {
 Bench::Bench() {
   unexportAll();
   for (const char* device : {"imu", "pwm", "counter", "adc"}) fault(device, 0, 0);
+  serveImu("");
   setImu({0, 0, 4096}, {0, 0, 0});
   writeText(kDebug + "counter_stuck", "0");
   setCounts({0, 0, 0});
@@ -97,7 +98,14 @@ void Bench::drivePin(const std::string& chip, unsigned line, bool high) {
   writeText(simPath(chip, line, "pull"), high ? "pull-up" : "pull-down");
 }
 
+void Bench::serveImu(const std::string& driver) {
+  kernel_imu_ = !driver.empty();
+  writeText(kDebug + "imu_who_am_i", driver == "mpu6500" ? "112" : "113");  // their register maps, WHO_AM_I
+  writeText(kDebug + "imu_driver", driver + "\n");
+}
+
 void Bench::dataReady() {
+  if (kernel_imu_) return writeText(kDebug + "imu_data_ready", "1");
   drivePin("481ae000", kDataReadyLine, false);
   drivePin("481ae000", kDataReadyLine, true);
 }

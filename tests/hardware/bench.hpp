@@ -24,7 +24,9 @@ class Bench {
   std::array<Channel, 4> pwm() const;  // 48302200 A, B, 48304200 A, B
   bool pin(const std::string& chip, unsigned line) const;
   void drivePin(const std::string& chip, unsigned line, bool high);
-  void dataReady();  // a falling edge of the IMU's interrupt, gpio3.21
+  // Whose the IMU is: "" of /dev/i2c-2, else of this driver of the kernel's.
+  void serveImu(const std::string& driver);
+  void dataReady();  // a falling edge of the IMU's interrupt, gpio3.21, or the kernel driver's own interrupt
   void setImu(const std::array<int16_t, 3>& accel, const std::array<int16_t, 3>& gyro);
   void pushFifo(const std::vector<uint8_t>& bytes);
   void setCounts(const std::array<int64_t, 3>& counts);
@@ -43,6 +45,7 @@ class Bench {
   std::string simPath(const std::string& chip, unsigned line, const std::string& attribute) const;
 
   mutable std::map<std::string, std::string> sim_directories_;
+  bool kernel_imu_ = false;
 };
 
 // The IMU's interrupt at 200 Hz, for as long as it lives.

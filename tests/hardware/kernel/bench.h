@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0 */
-/* robot_bench: a robot's peripherals behind the real kernel subsystems: MPU-9250 on /dev/i2c-2, two EHRPWM
- * modules, three eQEP decoders, the ADC. In: debugfs /sys/kernel/debug/robot_bench (what the sensors measure,
- * faults). Out: what the drivers wrote. GPIO lines are gpio-sim's. Linux 6.1. */
+/* robot_bench: a robot's peripherals behind the real kernel subsystems: MPU-9250 and LSM6DSO on /dev/i2c-2,
+ * two EHRPWM modules, three eQEP decoders, the ADC. In: debugfs /sys/kernel/debug/robot_bench (what the
+ * sensors measure, faults). Out: what the drivers wrote. GPIO lines are gpio-sim's. Linux 6.1. */
 #ifndef ROBOT_BENCH_H
 #define ROBOT_BENCH_H
 
@@ -19,6 +19,10 @@ extern struct mutex bench_lock;
 
 int bench_take_fault(struct bench_fault *fault); /* 0 or -errno; with bench_lock held */
 void bench_fault_files(const char *name, struct dentry *dir, struct bench_fault *fault);
+
+struct i2c_msg;
+void bench_lsm6dso_message(struct i2c_msg *message); /* with bench_lock held; so */
+bool bench_lsm6dso_convert(const u8 *sample);
 
 int bench_imu_init(struct dentry *dir);
 void bench_imu_exit(void);

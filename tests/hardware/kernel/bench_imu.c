@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0
-/* MPU-9250 at address 0x68 of /dev/i2c-2: register file, reset, DMP memory, FIFO of 1024 bytes. */
+/* MPU-9250 at address 0x68 of /dev/i2c-2: register file, reset, DMP memory, FIFO of 1024 bytes, interrupt.
+ * For the kernel's own driver, which imu_driver binds: "mpu6500", "lsm6dso", or "" to let go. */
 #include <linux/fs.h>
 #include <linux/i2c.h>
+#include <linux/interrupt.h>
+#include <linux/irq.h>
+#include <linux/irq_sim.h>
+#include <linux/irqdomain.h>
 #include <linux/module.h>
 #include <linux/uaccess.h>
 
 #include "bench.h"
 
-enum { ADDRESS = 0x68, FIFO_BYTES = 1024, DMP_BYTES = 4096 };
+enum { ADDRESS = 0x68, LSM6DSO = 0x6a, FIFO_BYTES = 1024, DMP_BYTES = 4096 };
 enum {
+	FIFO_EN = 0x23,
+	INT_ENABLE = 0x38,
+	INT_STATUS = 0x3a,
 	SAMPLE = 0x3b,
 	SAMPLE_BYTES = 14,
 	USER_CTRL = 0x6a,
@@ -29,6 +37,8 @@ static u8 fifo[FIFO_BYTES];
 static unsigned int fifo_head, fifo_size;
 static u32 transfers;
 static struct bench_fault fault;
+static struct irq_domain *domain; /* of the chip's interrupt pin */
+static struct i2c_client *client; /* whose driver serves the chip; else /dev/i2c-2 does */
 
 static void reset(void)
 {
@@ -80,6 +90,10 @@ static u8 load(u8 at)
 		fifo_head = (fifo_head + 1) % FIFO_BYTES;
 		fifo_size--;
 		return value;
+	case INT_STATUS:
+		value = reg[INT_STATUS];
+		reg[INT_STATUS] = 0;
+		return value;
 	}
 	if (at >= SAMPLE && at < SAMPLE + SAMPLE_BYTES)
 		return reg[POWER] & 0x40 ? 0 : sample[at - SAMPLE];
@@ -110,10 +124,12 @@ static int transfer(struct i2c_adapter *adapter, struct i2c_msg *messages, int c
 	transfers++;
 	err = bench_take_fault(&fault);
 	for (i = 0; !err && i < count; i++) {
-		if (messages[i].addr != ADDRESS)
-			err = -ENXIO;
-		else
+		if (messages[i].addr == ADDRESS)
 			one_message(&messages[i]);
+		else if (messages[i].addr == LSM6DSO)
+			bench_lsm6dso_message(&messages[i]);
+		else
+			err = -ENXIO;
 	}
 	mutex_unlock(&bench_lock);
 	return err ? err : count;
@@ -143,16 +159,10 @@ static ssize_t sample_write(struct file *file, const char __user *from, size_t s
 	return size;
 }
 
-static ssize_t fifo_write(struct file *file, const char __user *from, size_t size, loff_t *at)
+static void push(const u8 *bytes, size_t size)
 {
-	u8 bytes[64];
 	size_t i;
 
-	if (size > sizeof(bytes))
-		return -EINVAL;
-	if (copy_from_user(bytes, from, size))
-		return -EFAULT;
-	mutex_lock(&bench_lock);
 	for (i = 0; i < size && (reg[USER_CTRL] & 0x40); i++) {
 		fifo[(fifo_head + fifo_size) % FIFO_BYTES] = bytes[i];
 		if (fifo_size < FIFO_BYTES)
@@ -160,19 +170,89 @@ static ssize_t fifo_write(struct file *file, const char __user *from, size_t siz
 		else
 			fifo_head = (fifo_head + 1) % FIFO_BYTES; /* the oldest is lost */
 	}
+}
+
+static ssize_t fifo_write(struct file *file, const char __user *from, size_t size, loff_t *at)
+{
+	u8 bytes[64];
+
+	if (size > sizeof(bytes))
+		return -EINVAL;
+	if (copy_from_user(bytes, from, size))
+		return -EFAULT;
+	mutex_lock(&bench_lock);
+	push(bytes, size);
 	mutex_unlock(&bench_lock);
 	return size;
 }
 
+/* A conversion has ended: into the FIFO what FIFO_EN names, in the order of the registers; then the pin. */
+static ssize_t data_ready_write(struct file *file, const char __user *from, size_t size, loff_t *at)
+{
+	bool raise;
+
+	mutex_lock(&bench_lock);
+	if (!(reg[POWER] & 0x40)) {
+		if (reg[FIFO_EN] & 0x08)
+			push(sample, 6);
+		if (reg[FIFO_EN] & 0x80)
+			push(sample + 6, 2);
+		if ((reg[FIFO_EN] & 0x70) == 0x70)
+			push(sample + 8, 6);
+		reg[INT_STATUS] |= 0x01;
+	}
+	raise = reg[INT_STATUS] & reg[INT_ENABLE] & 0x01;
+	raise |= bench_lsm6dso_convert(sample);
+	mutex_unlock(&bench_lock);
+	if (raise)
+		irq_set_irqchip_state(irq_find_mapping(domain, 0), IRQCHIP_STATE_PENDING, true);
+	return size;
+}
+
+static ssize_t driver_write(struct file *file, const char __user *from, size_t size, loff_t *at)
+{
+	struct i2c_board_info info = {.addr = ADDRESS, .irq = irq_find_mapping(domain, 0)};
+	char name[I2C_NAME_SIZE] = {};
+
+	if (size >= sizeof(name))
+		return -EINVAL;
+	if (copy_from_user(name, from, size))
+		return -EFAULT;
+	strscpy(info.type, strim(name), sizeof(info.type));
+	i2c_unregister_device(client);
+	client = NULL;
+	if (!*info.type)
+		return size;
+	if (!strcmp(info.type, "lsm6dso"))
+		info.addr = LSM6DSO;
+	client = i2c_new_client_device(&adapter, &info);
+	if (!IS_ERR(client))
+		return size;
+	client = NULL;
+	return -ENODEV;
+}
+
+static const struct file_operations data_ready_fops = {.owner = THIS_MODULE, .write = data_ready_write};
+static const struct file_operations driver_fops = {.owner = THIS_MODULE, .write = driver_write};
 static const struct file_operations sample_fops = {.owner = THIS_MODULE, .write = sample_write};
 static const struct file_operations fifo_fops = {.owner = THIS_MODULE, .write = fifo_write};
 static struct debugfs_blob_wrapper registers = {.data = reg, .size = sizeof(reg)};
 
 int bench_imu_init(struct dentry *dir)
 {
+	domain = irq_domain_create_sim(NULL, 1);
+	if (IS_ERR(domain))
+		return PTR_ERR(domain);
+	if (!irq_create_mapping(domain, 0)) {
+		irq_domain_remove_sim(domain);
+		return -ENOMEM;
+	}
+	irq_set_irq_type(irq_find_mapping(domain, 0), IRQ_TYPE_EDGE_RISING);
 	reset();
 	debugfs_create_file("imu_sample", 0200, dir, NULL, &sample_fops);
 	debugfs_create_file("imu_fifo", 0200, dir, NULL, &fifo_fops);
+	debugfs_create_file("imu_data_ready", 0200, dir, NULL, &data_ready_fops);
+	debugfs_create_file("imu_driver", 0200, dir, NULL, &driver_fops);
 	debugfs_create_blob("imu_registers", 0444, dir, &registers);
 	debugfs_create_u8("imu_who_am_i", 0644, dir, &who_am_i);
 	debugfs_create_u32("imu_transfers", 0444, dir, &transfers);
@@ -182,5 +262,8 @@ int bench_imu_init(struct dentry *dir)
 
 void bench_imu_exit(void)
 {
+	i2c_unregister_device(client);
 	i2c_del_adapter(&adapter);
+	irq_dispose_mapping(irq_find_mapping(domain, 0));
+	irq_domain_remove_sim(domain);
 }

@@ -2,8 +2,12 @@
 
 #include <cmath>
 #include <equipoise/runtime/monotonic.hpp>
+#include <fstream>
+#include <regex>
+#include <sstream>
 
 #include "app/board/board.hpp"
+#include "equipoise/imu_parts.h"
 #include "robots/robot_list.hpp"
 #include "support/pin.hpp"
 
@@ -14,6 +18,38 @@ namespace {
 constexpr std::int64_t kPeriod_ns = 5'000'000;
 constexpr const char *kGpio0 = "44e07000", *kGpio1 = "4804c000", *kGpio2 = "481ac000", *kGpio3 = "481ae000";
 constexpr std::size_t kPwm1A = 0, kPwm1B = 1, kPwm2A = 2;
+
+std::string text_of(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+// The robot's files with an IMU that the kernel serves, at 200 Hz or the next rate that its driver has.
+void serve_by_kernel(PinRobot* robot) {
+  int part = 0;
+  while (imu_part(part)->name != robot->imu_driver) ++part;
+  int setting = 0;
+  for (int i = 1; i <= IMU_LOW_PASS_MAX; ++i) {
+    const int rate_hz = imu_low_pass(part, i)->rate_hz;
+    if (rate_hz >= 200 && (setting == 0 || rate_hz < imu_low_pass(part, setting)->rate_hz)) setting = i;
+  }
+  const std::regex ours("\n(bus|address|interrupt|interrupt_active_low|dmp_firmware|low_pass) =[^\n]*");
+  const std::string imu =
+      "[imu]\ndriver = \"iio\"\npart = \"" + robot->imu_driver + "\"\nlow_pass = " + std::to_string(setting);
+  const std::string board = std::regex_replace(text_of(robot->board), ours, "");
+  robot->board = "/tmp/board.toml";
+  std::ofstream(robot->board) << std::regex_replace(board, std::regex("\\[imu\\][^\n]*"), imu);
+  std::string config = text_of(robot->config);
+  const auto set = [&config](const std::string& key, double value) {
+    config = std::regex_replace(config, std::regex("\n" + key + " = [^ \n]*"),
+                                "\n" + key + " = " + std::to_string(value));
+  };
+  set("gyro_delay_s", imu_low_pass(part, setting)->gyro_delay_s);
+  set("accel_delay_s", imu_low_pass(part, setting)->accel_delay_s);
+  robot->config = "/tmp/config.toml";
+  std::ofstream(robot->config) << config;
+}
 }  // namespace
 
 PinRobot PinRobot::mbbr() {
@@ -24,6 +60,21 @@ PinRobot PinRobot::mbbr() {
            {kPwm1B, pin_of(kGpio1, 16), pin_of(kGpio2, 17), +1, 1, +1},
            {kPwm2A, pin_of(kGpio2, 9), pin_of(kGpio2, 8), +1, 2, +1}},
           {pin_of(kGpio1, 17), pin_of(kGpio3, 17), pin_of(kGpio3, 16)}};
+}
+
+PinRobot PinRobot::mbbr_mpu6500() {
+  PinRobot robot = mbbr();
+  robot.name = "MbbrMpu6500";
+  robot.imu_driver = "mpu6500";
+  return robot;
+}
+
+PinRobot PinRobot::mbbr_lsm6dso() {
+  PinRobot robot = mbbr();
+  robot.name = "MbbrLsm6dso";
+  robot.imu_driver = "lsm6dso";
+  robot.own_pace = true;
+  return robot;
 }
 
 PinRobot PinRobot::edumip() {
@@ -66,11 +117,15 @@ struct PinWorld::WorldOf final : PinWorld::World {
 };
 
 PinWorld::PinWorld(Bench& bench, const PinRobot& robot, std::uint64_t seed) : bench_(bench), robot_(robot) {
-  const equipoise::app::Board board = equipoise::app::load_board(robot.board);
+  if (!robot_.imu_driver.empty()) {
+    serve_by_kernel(&robot_);
+    bench_.serveImu(robot_.imu_driver);
+  }
+  const equipoise::app::Board board = equipoise::app::load_board(robot_.board);
   battery_channel_ = board.wiring.battery_channel;
-  world_ = equipoise::with_robot(board.robot, robot.board, [&](auto firmware) -> std::unique_ptr<World> {
+  world_ = equipoise::with_robot(board.robot, robot_.board, [&](auto firmware) -> std::unique_ptr<World> {
     using Firmware = decltype(firmware);
-    const auto config = Firmware::load(robot.config, equipoise::app::overrides_of(board)).config;
+    const auto config = Firmware::load(robot_.config, equipoise::app::overrides_of(board)).config;
     safety_ = config.safety;
     return std::make_unique<WorldOf<Firmware>>(config, seed);
   });

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "bench.hpp"
@@ -22,12 +23,17 @@ struct PinWheel {
 /// A robot of the emulated board.
 struct PinRobot {
   const char* name;
-  const char* config;
-  const char* board;
+  std::string config;
+  std::string board;
   std::vector<PinWheel> wheels;
   std::vector<bbb_pin_t> complaints;  // SF lines of the bridges, low when one complains
+  std::string imu_driver = {};        // of the kernel's; empty: our own
+
+  bool own_pace = false;  // its IMU has another rate: ticks wait for their time, not for a sample
 
   static PinRobot mbbr();
+  static PinRobot mbbr_mpu6500();  // the same with the chip behind inv_mpu6050
+  static PinRobot mbbr_lsm6dso();  // with another chip, behind st_lsm6dsx
   // Pins and polarities of librobotcontrol's motor.c, signs of its rc_balance.
   static PinRobot edumip();
   static PinRobot edumip_blue();
@@ -45,6 +51,7 @@ class PinWorld {
   bool motorsOff() const;  // no pulse on any channel and the bridges asleep, from the kernel's side
   double tilt_rad() const;
   bool held() const;
+  const PinRobot& robot() const { return robot_; }                   // with the files to give to the firmware
   const equipoise::SafetyParams& safety() const { return safety_; }  // as the firmware reads them
   std::int64_t now_ns() const { return due_ns_; }                    // CLOCK_MONOTONIC of the last tick
   int late() const { return late_; }  // ticks that began after the next one was due

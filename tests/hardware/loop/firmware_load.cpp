@@ -107,8 +107,8 @@ pid_t start(const PinRobot& robot) {
   const pid_t child = fork();
   if (child != 0) return child;
   const std::string program = fs::read_symlink("/proc/self/exe").parent_path() / "../../equipoise";
-  execl(program.c_str(), "equipoise", "run", "--config", robot.config, "--board", robot.board, "--arm",
-        "--without-calibration", "--log", "/tmp/run.lcm", nullptr);
+  execl(program.c_str(), "equipoise", "run", "--config", robot.config.c_str(), "--board", robot.board.c_str(),
+        "--arm", "--without-calibration", "--log", "/tmp/run.lcm", nullptr);
   _exit(127);
 }
 
