@@ -4,9 +4,13 @@ import os
 import shutil
 import subprocess
 
+import equipoise
 import pytest
+from equipoise_robot import channels, design
 from equipoise_robot.errors import UserError
 from equipoise_robot.log import read_log
+
+import lcm
 
 PATIENCE_S = 60
 
@@ -192,17 +196,24 @@ def test_dots_without_end_are_refused(do, root, tmp_path):
     (tmp_path / "deep.toml").write_text(attack + text)
     sim = ["sim", "--duration-s", "1", "--log", "off", "--config"]
     assert "dots in a line" in do(*sim, "deep.toml", status=2)
+    with pytest.raises(UserError, match="dots in a line"):
+        design(tmp_path / "deep.toml")
 
 
-@pytest.mark.parametrize(
-    "key", ["population.actual.boddy_mass_scale", "population.disturbance.static_ration", "population.typo"]
-)
-def test_a_table_that_is_not_needed_is_checked_all_the_same(do, root, tmp_path, key):
-    table, _, name = key.rpartition(".")
-    text = (root / "config/edumip.toml").read_text()
-    text = text.replace(f"[{table}]\n", f"[{table}]\n{name} = [0.9, 1.1]\n", 1)
-    (tmp_path / "robot.toml").write_text(text)
-    assert key in do("sim", "--config", "robot.toml", "--duration-s", "1", "--log", "off", status=2)
+def test_nor_are_those_of_a_hostile_log(do, log, tmp_path):
+    hostile = lcm.EventLog(str(tmp_path / "hostile.lcm"), "w")
+    for event in lcm.EventLog(str(log)):
+        data = event.data
+        if event.channel == channels.RUN:
+            message = equipoise.run_t.decode(data)
+            message.config_toml = 'a = "\\""' + ".a" * 200_000 + "\n" + message.config_toml
+            data = message.encode()
+        hostile.write_event(event.timestamp, event.channel, data)
+    hostile.close()
+    assert "dots in a line" in do("replay", "hostile.lcm", status=2)
+    assert "dots in a line" in do("replay", "hostile.lcm", "--shadow", status=2)
+    with pytest.raises(ValueError, match="dots in a line"):
+        read_log(tmp_path / "hostile.lcm").sensors()
 
 
 def test_what_a_terminal_would_obey_is_not_printed(do):
