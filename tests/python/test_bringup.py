@@ -54,6 +54,16 @@ def test_motion_is_refused_with_its_size_and_nothing_is_written(root, tmp_path):
     assert not out.exists()
 
 
+def test_a_calibration_through_a_link_renews_the_file_and_no_other(root, tmp_path):
+    out, link, other = (tmp_path / n for n in ("calibration.toml", "link.toml", "calibration.toml.partial"))
+    link.symlink_to(out)
+    other.write_text("mine")
+    for _ in range(2):
+        assert on_stand(root, "calibrate gyro", "--out", link if out.exists() else out).returncode == 0
+    assert link.is_symlink() and other.read_text() == "mine"
+    assert sorted(tmp_path.iterdir()) == [out, other, link]
+
+
 def test_a_poor_fit_of_the_accelerometer_is_not_kept(root, tmp_path):
     """Beyond 15 mg, hardware.md says, nothing is written: what was measured before stays."""
     out = tmp_path / "calibration.toml"

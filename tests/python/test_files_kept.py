@@ -55,10 +55,14 @@ def test_a_result_replaces_only_its_own_kind(do, log, tmp_path):
     for kind, command in {
         "csv": ["convert", "x.lcm", "--to", "csv", "--out"],
         "mcap": ["convert", "x.lcm", "--to", "mcap", "--out"],
+        "log": ["friction-rig", "--log"],
         "buttons of an app": ["remote", "learn", "--port", "/dev/null", "--out"],
     }.items():
         assert f"notes.md: exists and holds no {kind}" in do(*command, "notes.md", status=2)
+    bench = ["motor-bench", "--motor", "1", "--driver", "1", "--pwm-hz", "10000", "--log"]
+    assert "notes.md: exists and holds no log" in do(*bench, "notes.md", status=2)
     for _ in range(2):
+        do("friction-rig", "--log", "rig.lcm", status=0)
         do("convert", "x.lcm", "--to", "csv", status=0)
         do("convert", "x.lcm", "--to", "mcap", status=0)
     assert notes.read_text() == "A winter's work\n"
@@ -185,6 +189,7 @@ def test_nothing_waits_for_a_pipe(do, root, tmp_path):
     assert "is no file" in do("send", "--key", "pipe", "--arm", status=2)
     assert "no regular file" in do(*sim, "off", "--path", "pipe", status=2)
     assert "is a pipe" in do(*sim, "pipe.lcm", status=1)
+    assert "is a pipe" in do("friction-rig", "--log", "pipe.lcm", status=2)
     for name in (tmp_path / "pipe.lcm", "/dev/zero"):
         with pytest.raises(UserError, match="is no regular file"):
             read_log(name)

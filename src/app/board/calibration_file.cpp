@@ -1,5 +1,7 @@
 #include "app/board/calibration_file.hpp"
 
+#include <unistd.h>
+
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -163,15 +165,18 @@ std::string to_toml(const CalibrationFile& file) {
   return text;
 }
 
+/// The file itself, not a link to it; beside it under a name that no other file has.
 void write_whole(const std::string& text, const std::string& path) {
-  const std::string partial = path + ".partial";
+  std::error_code error;
+  const std::filesystem::path linked = std::filesystem::canonical(path, error);
+  const std::string target = error ? path : linked.string();
+  const std::string partial = target + "." + std::to_string(getpid()) + ".partial";
   {
     std::ofstream file(partial);
     file << text;
     if (!file.flush()) throw InputError(path + ": cannot be written");
   }
-  std::error_code error;
-  std::filesystem::rename(partial, path, error);
+  std::filesystem::rename(partial, target, error);
   if (error) throw InputError(path + ": " + error.message());
 }
 
