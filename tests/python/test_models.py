@@ -31,6 +31,14 @@ def test_the_committed_model_is_the_configured_robot(root, robot, suffix):
     ), "run build/venv/bin/python -m equipoise_robot.models"
 
 
+def test_kugles_wheels_touch_the_ball_where_they_do_on_kugle(root):
+    """[K]: 45 degrees from the top, the first 45 degrees from x towards y, the others 120 and 240 beyond."""
+    _, kugle = models.dimensions(root / "config/kugle.toml")
+    for contact, azimuth in zip(kugle["wheel_contacts"], np.radians([45.0, 165.0, 285.0]), strict=True):
+        place = np.array([np.cos(azimuth), np.sin(azimuth), 1.0]) / np.sqrt(2.0)
+        assert np.array(contact) == pytest.approx(place, abs=1e-9)
+
+
 @pytest.mark.skipif(shutil.which("check_urdf") is None, reason="tools/test installs liburdfdom-tools")
 def test_ros_own_parser_takes_the_urdf(root, robot):
     path = root / f"models/{STEMS[robot]}.urdf"
