@@ -8,7 +8,7 @@ venv=$root/build/venv
 venv_python=$venv/bin/python
 # The compiler's cache serves every build folder of a tree: the wheel's has what build/host compiled.
 export CCACHE_NOHASHDIR=1
-export CCACHE_SLOPPINESS=pch_defines,time_macros # or nothing that includes a precompiled header is kept
+export CCACHE_SLOPPINESS=pch_defines,time_macros,locale # or nothing that includes a precompiled header is kept
 export MPLCONFIGDIR=$root/build/matplotlib # the font list of another environment on this machine is not ours
 jobs=$(nproc)
 
