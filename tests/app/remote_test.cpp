@@ -240,9 +240,12 @@ TEST_F(EventRemote, AStickBeyondItsRangeIsAtItsEnd) {
   EXPECT_EQ(device.look(0).forward, 1.0);
   put(EV_KEY, KEY_S, 1);
   EXPECT_EQ(device.look(0).forward, 0.0) << "one forward and one back";
+  put(EV_ABS, ABS_Y, 600);
+  EXPECT_EQ(device.look(0).forward, -1.0) << "two back are no more than one";
   put(EV_KEY, KEY_S, 0);
   put(EV_KEY, KEY_W, 1);
-  EXPECT_EQ(device.look(0).forward, 1.0) << "two forward are no more than one";
+  put(EV_ABS, ABS_Y, -400);
+  EXPECT_EQ(device.look(0).forward, 1.0) << "nor are two forward";
 }
 
 TEST_F(EventRemote, AStickWhosePastIsUnknownWaitsUntilItIsAtRest) {

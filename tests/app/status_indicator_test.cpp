@@ -2,17 +2,21 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+
 namespace equipoise::app {
 namespace {
 
 TEST(StatusIndicator, LightsTellArmedReadyAndForbidden) {
-  for (const bool odd : {false, true}) {
-    const auto armed = StatusIndicator::lights(ArmState::kArmed, 0, odd);
+  for (unsigned turn = 0; turn < 30; ++turn) {
+    const auto armed = StatusIndicator::lights(ArmState::kArmed, 0, turn);
     EXPECT_TRUE(armed.green && !armed.red);
-    const auto ready = StatusIndicator::lights(ArmState::kDisarmed, kNotRequested, odd);
-    EXPECT_EQ(ready.green, odd);
+    const auto ready = StatusIndicator::lights(ArmState::kDisarmed, kNotRequested, turn);
+    EXPECT_EQ(ready.green,
+              turn * StatusIndicator::kTurn % std::chrono::seconds(1) >= std::chrono::milliseconds(500))
+        << "a blink a second, turn " << turn;
     EXPECT_FALSE(ready.red);
-    const auto forbidden = StatusIndicator::lights(ArmState::kDisarmed, kNotRequested | kBatteryLow, odd);
+    const auto forbidden = StatusIndicator::lights(ArmState::kDisarmed, kNotRequested | kBatteryLow, turn);
     EXPECT_TRUE(!forbidden.green && forbidden.red);
   }
 }

@@ -1,6 +1,5 @@
 #include "app/run/status_indicator.hpp"
 
-#include <chrono>
 #include <cstdio>
 #include <cstring>
 
@@ -39,7 +38,10 @@ StatusIndicator::~StatusIndicator() {
   if (has_can_) can_close(&can_);
 }
 
-StatusIndicator::Lights StatusIndicator::lights(ArmState state, std::uint32_t reasons, bool odd) noexcept {
+StatusIndicator::Lights StatusIndicator::lights(ArmState state, std::uint32_t reasons,
+                                                unsigned turn) noexcept {
+  constexpr unsigned kTurnsPerBlink = 5;
+  const bool odd = turn / kTurnsPerBlink % 2 == 1;
   const bool ready = (reasons & ~std::uint32_t{kNotRequested}) == 0;
   return {state == ArmState::kArmed || (ready && odd), state != ArmState::kArmed && !ready};
 }
@@ -55,12 +57,10 @@ can_frame StatusIndicator::frame(std::uint64_t status) noexcept {
 }
 
 void StatusIndicator::run() {
-  constexpr auto kTurn = std::chrono::milliseconds(100);
-  constexpr unsigned kTurnsPerBlink = 5;
   for (unsigned turn = 0; !stop_.load(); ++turn) {
     const std::uint64_t status = now_.load(std::memory_order_relaxed);
     const auto state = static_cast<ArmState>(static_cast<std::uint8_t>(status >> 32U));
-    const Lights show = lights(state, static_cast<std::uint32_t>(status), turn / kTurnsPerBlink % 2 == 1);
+    const Lights show = lights(state, static_cast<std::uint32_t>(status), turn);
     if (has_green_) (void)led_set(&green_, show.green);
     if (has_red_) (void)led_set(&red_, show.red);
     if (has_can_) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <thread>
 
@@ -31,12 +32,13 @@ class StatusIndicator : NoCopy {
                std::memory_order_relaxed);
   }
 
-  /// What the LEDs show in a given half second.
+  /// What the LEDs show in a turn of 100 ms: ready is a blink a second.
   struct Lights {
     bool green;
     bool red;
   };
-  static Lights lights(ArmState state, std::uint32_t reasons, bool odd) noexcept;
+  static constexpr std::chrono::milliseconds kTurn{100};
+  static Lights lights(ArmState state, std::uint32_t reasons, unsigned turn) noexcept;
   static can_frame frame(std::uint64_t status) noexcept;
 
  private:

@@ -120,6 +120,34 @@ TEST(MbbrReference, TravelGetsWhatTheTurnLeavesInItsDirection) {
   EXPECT_LT((speed({0.03, 0.04}, 3.0) - Vec2(0.03, 0.04)).norm(), 1e-9);
 }
 
+/// (6.13) and section 6.2.1: lean(k+1) = pole lean(k) + gain unit e, e filtered to first order; (6.12).
+TEST(MbbrReference, LeanAndFilteredErrorFollowTheirDifferenceEquations) {
+  for (const double sign : {1.0, -1.0}) {
+    MbbrReferenceParams p = reference_params();
+    p.schedule.rows = 1;
+    p.schedule.row[0] = {3.0, 0.5, 10.0};
+    p.slc_unit = 0.002;
+    p.slc_sign = sign;
+    MbbrReferenceStage stage(p);
+    stage.reset(MbbrEstimate{});
+    MbbrEstimate x;
+    x.phi_dot_star = Vec2(-0.5, 0.25);
+    const Vec2 e = -x.phi_dot_star;
+    const Vec2 step = sign * 3.0 * 0.002 * e;
+    double lean = 0.0;  // of steps
+    double left = 1.0;
+    for (int k = 0; k < 6; ++k) {
+      const MbbrReference ref = stage.update(Command{}, x);
+      left *= std::exp(-10.0 * kTickS);
+      EXPECT_LT((ref.d_phi_dot - (1.0 - left) * e).norm(), 1e-12) << k;
+      EXPECT_LT((ref.theta_xy - lean * step).norm(), 1e-12) << k;
+      const double before = k == 0 ? 0.0 : 2.0 * (lean - 1.0);
+      EXPECT_LT((ref.rate_xy - (lean - before) * step / kTickS).norm(), 1e-9) << k;
+      lean = 0.5 * lean + 1.0;
+    }
+  }
+}
+
 /// "Forward" is where the robot looked at the last reset of its heading.
 TEST(MbbrReference, AHeadingResetTurnsForward) {
   MbbrReferenceStage stage(reference_params());

@@ -31,6 +31,13 @@ TEST(Riccati, SolutionLeavesNoResidualAndStabilises) {
   EXPECT_LT((e.A - e.B * K).eigenvalues().cwiseAbs().maxCoeff(), 1.0);
 }
 
+TEST(Riccati, ItsUnitIsThatOfTheCost) {
+  const Example e;
+  const CMatrix X = riccati(e.A, e.B, e.Q, e.R);
+  for (const double unit : {1e-12, 1e12})
+    EXPECT_LT((riccati(e.A, e.B, unit * e.Q, unit * e.R) / unit - X).norm(), 1e-11 * X.norm()) << unit;
+}
+
 TEST(Riccati, ScalarHasTheClosedForm) {
   // x = 2 x + u, q = r = 1: X = 4 X - 4 X^2/(1 + X) + 1.
   const CMatrix X =

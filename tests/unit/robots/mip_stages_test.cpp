@@ -181,6 +181,27 @@ TEST(MipLqrFeedback, IsTheGainsTimesTheErrors) {
   EXPECT_EQ(u(&MipReference::psi_dot, 4.0), Vec2(0.0, 0.5));
 }
 
+/// Of what is on its way to the motors: as the limit left it, without what only balances the back-EMF.
+TEST(MipLqrFeedback, CountsWhatItAskedForInTheTickBefore) {
+  MipLqrParams p;
+  p.gains.lqr = {-10.0, 0.0, 0.0, 0.0, -0.5};
+  p.gains.speed = 0.0625;
+  p.max_u = 1.5;
+  p.soft_start_s = 0.0;
+  MipLqrFeedback feedback(p);
+  const auto u = [&feedback](double d_theta, bool restart = false) {
+    MipReference ref = one_error(&MipReference::d_theta, d_theta);
+    ref.phi_dot = 4.0;  // against the back-EMF: 0.25
+    ref.restart = restart;
+    return feedback.update(ref).x();
+  };
+  EXPECT_EQ(u(0.05), -0.5 + 0.25);
+  EXPECT_EQ(u(0.0), 0.25 + 0.25) << "half of -0.5, the other way";
+  EXPECT_EQ(u(1.0), -1.5) << "the limit";
+  EXPECT_EQ(u(0.0), 0.875 + 0.25) << "half of -1.75, which acted";
+  EXPECT_EQ(u(0.0, true), 0.25) << "a new start forgets";
+}
+
 template <class Feedback, class Params>
 void expect_a_soft_start(Params p, double asks_for_much) {
   p.max_u = 1.0;
