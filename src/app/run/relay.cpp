@@ -133,9 +133,20 @@ void Conversation::relay(int requests) {
     std::fflush(stdout);
   };
 
-  /// What was asked before this process was stopped is void, but for a disarm.
+  const auto read_requests = [&lines](std::vector<LiveRequest>* requested) {
+    while (const auto line = lines.next()) {
+      const auto request = live_request(*line);
+      if (!request)
+        throw InputError("--live: '" + *line +
+                         "': expected arm, disarm, heading-reset, take, or drive FORWARD LEFT YAW in m/s, "
+                         "m/s, turns/s");
+      requested->push_back(*request);
+    }
+  };
+  /// What was asked before this process went on is void, but for a disarm; also what it has not read yet.
   const auto void_if_late = [&](std::vector<LiveRequest>* requested) {
     if (stopped_s_ <= kStopped_s) return;
+    read_requests(requested);
     std::fprintf(stderr, "equipoise: was stopped for %.1f s: what was asked before is void\n", stopped_s_);
     stopped_s_ = 0.0;
     if (wish != signed_command_t::DISARM) wish = kNone;
@@ -154,14 +165,7 @@ void Conversation::relay(int requests) {
     heard_ms = robot().heard_ms;
     if (Clock::now() > heard_at + patience) fail("is heard no more");
     std::vector<LiveRequest> requested;
-    while (const auto line = lines.next()) {
-      const auto request = live_request(*line);
-      if (!request)
-        throw InputError("--live: '" + *line +
-                         "': expected arm, disarm, heading-reset, take, or drive FORWARD LEFT YAW in m/s, "
-                         "m/s, turns/s");
-      requested.push_back(*request);
-    }
+    read_requests(&requested);
     listen(0.0);  // and sees whether it was stopped
     void_if_late(&requested);
     for (const LiveRequest& request : requested) {
@@ -184,6 +188,8 @@ void Conversation::relay(int requests) {
     }
     // A late arm surprises; a disarm never comes too late.
     if (wish != kNone && wish != signed_command_t::DISARM && Clock::now() > wish_ends) wish = kNone;
+    note_awake();
+    if (stopped_s_ > kStopped_s) continue;
     if (Clock::now() >= next && (wish != kNone || (motion && robot().turn == turn))) {
       say(wish != kNone ? sender_.sign(&robot(), wish_turn, wish)
                         : sender_.sign(&robot(), turn, signed_command_t::DRIVE, *motion));
