@@ -6,18 +6,12 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "equipoise/real.hpp"
-
 namespace equipoise {
 
-template <class Real, int N>
-using VecOf = Eigen::Matrix<Real, N, 1>;
-template <class Real, int Rows, int Cols>
-using MatOf = Eigen::Matrix<Real, Rows, Cols>;
 template <int N>
-using Vec = VecOf<double, N>;
+using Vec = Eigen::Matrix<double, N, 1>;
 template <int Rows, int Cols>
-using Mat = MatOf<double, Rows, Cols>;
+using Mat = Eigen::Matrix<double, Rows, Cols>;
 using Vec2 = Vec<2>;
 using Vec3 = Vec<3>;
 using Mat3 = Mat<3, 3>;
@@ -28,51 +22,33 @@ inline constexpr double kGravity_m_s2 = 9.8;     // [T] Tables 3.2, 5.2
 inline constexpr double kPi = 3.14159265358979323846;
 
 /// Rz(angle) of horizontal vectors, and back.
-template <class Real>
-class TurnOf {
+class Turn {
  public:
-  using V = VecOf<Real, 2>;
-
-  explicit TurnOf(const Real& angle_rad) noexcept : c_(cosine_of(angle_rad)), s_(sine_of(angle_rad)) {}
-  V operator()(const V& v) const noexcept { return {c_ * v.x() - s_ * v.y(), s_ * v.x() + c_ * v.y()}; }
-  V back(const V& v) const noexcept { return {c_ * v.x() + s_ * v.y(), c_ * v.y() - s_ * v.x()}; }
+  explicit Turn(double angle_rad) noexcept : c_(std::cos(angle_rad)), s_(std::sin(angle_rad)) {}
+  Vec2 operator()(const Vec2& v) const noexcept { return {c_ * v.x() - s_ * v.y(), s_ * v.x() + c_ * v.y()}; }
+  Vec2 back(const Vec2& v) const noexcept { return {c_ * v.x() + s_ * v.y(), c_ * v.y() - s_ * v.x()}; }
   /// Of what turns within a tick: to 1e-10 up to 0.2 rad, by series.
-  static TurnOf small(const Real& angle_rad) noexcept {
-    const Real a2 = angle_rad * angle_rad;
+  static Turn small(double angle_rad) noexcept {
+    const double a2 = angle_rad * angle_rad;
     return {1.0 - a2 * (0.5 - a2 * (1.0 / 24.0 - a2 * (1.0 / 720.0))),
             angle_rad * (1.0 - a2 * (1.0 / 6.0 - a2 * (1.0 / 120.0 - a2 * (1.0 / 5040.0))))};
   }
   /// `angle`, when this one turns by little: exact to the last digit or so up to 0.03 rad, else anew.
-  TurnOf near(const Real& angle_rad, const Real& by) const noexcept {
-    using std::abs;
-    const auto little = abs(by) < 0.03;
-    if (all(little)) return *this * small(by);
-    const TurnOf anew(angle_rad);
-    const TurnOf then = *this * small(by);
-    return {select(little, then.c_, anew.c_), select(little, then.s_, anew.s_)};
+  Turn near(double angle_rad, double by_rad) const noexcept {
+    return std::abs(by_rad) < 0.03 ? *this * small(by_rad) : Turn(angle_rad);
   }
   /// This one and then the other.
-  TurnOf operator*(const TurnOf& then) const noexcept {
+  Turn operator*(const Turn& then) const noexcept {
     return {c_ * then.c_ - s_ * then.s_, s_ * then.c_ + c_ * then.s_};
   }
-  const Real& cosine() const noexcept { return c_; }
-  const Real& sine() const noexcept { return s_; }
+  double cosine() const noexcept { return c_; }
+  double sine() const noexcept { return s_; }
 
  private:
-  TurnOf(const Real& c, const Real& s) noexcept : c_(c), s_(s) {}
+  Turn(double c, double s) noexcept : c_(c), s_(s) {}
 
-  static Real cosine_of(const Real& angle_rad) noexcept {
-    using std::cos;
-    return cos(angle_rad);
-  }
-  static Real sine_of(const Real& angle_rad) noexcept {
-    using std::sin;
-    return sin(angle_rad);
-  }
-
-  Real c_, s_;
+  double c_, s_;
 };
-using Turn = TurnOf<double>;
 
 inline Vec2 rotate(double angle_rad, const Vec2& v) noexcept { return Turn(angle_rad)(v); }
 

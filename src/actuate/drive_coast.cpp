@@ -123,14 +123,26 @@ bool discontinuous(double T_r, double full_decay, double v, double b, double d) 
 
 }  // namespace
 
-template <>
-DriveCoastCommand::DriveCoastCommandOf(double T_r, double u) noexcept
+DriveCoastCommand::DriveCoastCommand(double T_r, double u) noexcept
     : T_r_(T_r),
       sign_(u < 0.0 ? -1.0 : 1.0),
       v_(std::min(std::abs(u), 1.0)),
       drained_(-std::expm1(-v_ * T_r)),
       off_decay_(-std::expm1(-(1.0 - v_) * T_r)),
       full_decay_(-std::expm1(-T_r)) {}
+
+double DriveCoastCommand::mean_current(double omega_r) const noexcept {
+  if (v_ == 0.0) return 0.0;  // (4.28)
+  const double w = std::clamp(sign_ * omega_r, -1.0, 1.0);
+  const double b = 0.5 * (1.0 + w);
+  const double d = 0.5 * (1.0 - w);
+  const double flows_on = sign_ * (2.0 * v_ - 1.0 - w);  // (4.29)
+  if (b == 0.0) return flows_on;
+  if (!(T_r_ > 0.0)) return v_ > b ? flows_on : 0.0;  // (4.30), T_r -> 0
+  // (4.27) without its logarithm: v > boundary where exp(-(1 - v) T_r) > b + d exp(-T_r)
+  if (off_decay_ < d * full_decay_) return flows_on;
+  return sign_ * 2.0 * (v_ * d - b / T_r_ * std::log1p(d / b * drained_));  // (4.30)
+}
 
 double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept {
   return DriveCoastCommand(T_r, u).mean_current(omega_r);

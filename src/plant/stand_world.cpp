@@ -35,9 +35,8 @@ void StandWorld::advance(const MotorCommand& command) {
     for (std::size_t i = 0; i < static_cast<std::size_t>(stand_.wheels); ++i) {
       const double driven = torque(static_cast<Eigen::Index>(i)) - stand_.viscous_N_m_s * rate_[i];
       const double mobility = 1.0 / stand_.wheel_inertia_kg_m2;
-      const Vec<1> free(rate_[i] + h * mobility * driven);
-      const double net = driven + uncoupled_coulomb_torque<double, 1>(free, Vec<1>(mobility), h,
-                                                                      Vec<1>(stand_.coulomb_N_m))(0);
+      const double free = rate_[i] + h * mobility * driven;
+      const double net = driven + coulomb_torque(free, mobility, h, stand_.coulomb_N_m);
       rate_[i] += h * mobility * net;
       angle_[i] += h * rate_[i];
       on_body -= stand_.axis_B[i] * net;  // motor and gear hold on to the body

@@ -12,7 +12,6 @@
 #include "app/sim/workers.hpp"
 #include "python/python_engine.hpp"
 #include "python/simulation.hpp"
-#include "robots/lanes/roll.hpp"
 
 namespace equipoise::python {
 
@@ -129,22 +128,9 @@ class Episodes : NoCopy {
     } else {
       const nb::gil_scoped_release others;
       workers_.each(jobs, job);
-      workers_.start(groups(), roll_);
     }
   }
   int width() const { return width_; }
-  int groups() const { return (count() + kRobotsTogether - 1) / kRobotsTogether; }
-  /// What the next tick's action has no part in, while the caller thinks about it: the robots of a group roll
-  /// under the command that they have. Groups fill the vector registers; nobody's numbers depend on them.
-  void roll(int group) noexcept {
-    std::array<Episode*, kRobotsTogether> members{};
-    int n = 0;
-    for (int i = group * kRobotsTogether; i < std::min(count(), (group + 1) * kRobotsTogether); ++i) {
-      Episode* const episode = episodes_[static_cast<std::size_t>(i)].get();
-      if (episode != nullptr) members[static_cast<std::size_t>(n++)] = episode;
-    }
-    robot_.roll_ahead(members.data(), n);
-  }
   double* row(int i) {
     return &observations_[static_cast<std::size_t>(i) * static_cast<std::size_t>(width_)];
   }
@@ -172,7 +158,6 @@ class Episodes : NoCopy {
   double action_cost_;
   std::vector<double> observations_, rewards_;
   std::unique_ptr<bool[]> lost_, active_;
-  const std::function<void(int)> roll_{[this](int group) { roll(group); }};
   app::Workers workers_;  // gone first
 };
 

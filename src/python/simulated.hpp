@@ -7,42 +7,8 @@
 #include "equipoise/sense/calibrate.hpp"
 #include "python/hooks.hpp"
 #include "python/simulation.hpp"
-#include "robots/lanes/roll.hpp"
 
 namespace equipoise::python {
-
-/// A world whose next tick may have been rolled already, together with others'.
-template <class World, class = void>
-class Ahead : public World {
- public:
-  static constexpr bool kRolls = false;
-  explicit Ahead(const World& world) : World(world) {}
-};
-template <class World>
-class Ahead<World, std::void_t<typename World::Rolling>> : public World {
- public:
-  static constexpr bool kRolls = true;
-  explicit Ahead(const World& world) : World(world) {}
-
-  /// The numbers to roll, once before each advance() under the same command; else, or where more is on than
-  /// they describe, nullptr.
-  typename World::Rolling* begin(const MotorCommand& command) noexcept {
-    if (rolled_ || !World::begin_rolling(command, &numbers_)) return nullptr;
-    rolled_ = true;
-    return &numbers_;
-  }
-  void advance(const MotorCommand& command) override {
-    if (std::exchange(rolled_, false)) {
-      World::end_rolling(numbers_);
-    } else {
-      World::advance(command);
-    }
-  }
-
- private:
-  typename World::Rolling numbers_;
-  bool rolled_ = false;
-};
 
 template <class Firmware, class Access>
 class SimulatedOf : public Simulated {
@@ -124,27 +90,9 @@ class SimulatedOf : public Simulated {
             if (make)
               return std::make_unique<EpisodeOf<Own, EngineEpisode>>(*robot, config, seeded, own.params(),
                                                                      make);
-            return std::make_unique<EpisodeOf<Own, RollingEpisode>>(*robot, config, seeded, own.params());
+            return std::make_unique<EpisodeOf<Own, OwnEpisode>>(*robot, config, seeded, own.params());
           });
     };
-  }
-
-  void roll_ahead(Episode* const* episodes, int count) const noexcept override {
-    if constexpr (Ahead<World>::kRolls) {
-      std::array<typename World::Rolling*, kRobotsTogether> rolling{};
-      std::size_t n = 0;
-      const World* any = nullptr;  // all of one configuration, but for what is drawn
-      for (int i = 0; i < count; ++i) {
-        auto* episode = static_cast<RollingEpisode*>(episodes[i]);
-        rolling[n] = episode->begin();
-        if (rolling[n] == nullptr) continue;
-        any = &episode->world();
-        ++n;
-      }
-      if (n > 0)
-        roll_together(rolling.data(), static_cast<int>(n), any->bridge(), any->steps_per_tick(),
-                      any->step_s());
-    }
   }
 
   void calibrate(const std::string& toml, const std::vector<RawSample>& raw, double* out) const override {
@@ -200,22 +148,13 @@ class SimulatedOf : public Simulated {
     });
   }
 
-  /// Whose world may be advanced together with others'.
-  class RollingEpisode : public Episode {
-   public:
-    auto begin() noexcept {
-      const MotorCommand* command = next_command();
-      return command != nullptr ? world_.world.begin(*command) : nullptr;
-    }
-    const World& world() const noexcept { return world_.world; }
-
+  class OwnEpisode : public Episode {
    protected:
-    using EpisodeWorld = Ahead<World>;
-    RollingEpisode(const Config& config, const app::SimRequest& request)
+    using EpisodeWorld = World;
+    OwnEpisode(const Config& config, const app::SimRequest& request)
         : world_(config, request.choice, request.seed) {}
-    virtual const MotorCommand* next_command() const noexcept = 0;
 
-    app::WorldOf<Firmware, EpisodeWorld> world_;
+    app::WorldOf<Firmware> world_;
   };
 
   class EngineEpisode : public Episode {
@@ -226,8 +165,6 @@ class SimulatedOf : public Simulated {
         : params_(config.world[fidelity_level(request.choice.fidelity)]),
           engine_((params_.common.seed = request.seed, make(Access::dimensions(config.robot, params_)))),
           world_(config, EpisodeWorld(config.robot, config.motor, config.calibration, params_, *engine_)) {}
-    virtual const MotorCommand* next_command() const noexcept = 0;
-
     std::decay_t<decltype(Config::world[0])> params_;
     std::unique_ptr<Engine> engine_;
     app::WorldOf<Firmware, EpisodeWorld> world_;
@@ -266,9 +203,6 @@ class SimulatedOf : public Simulated {
       std::copy(wanted.begin(), wanted.end(), out);
     }
     StateView truth() const override { return world_.truth(); }
-
-   protected:
-    const MotorCommand* next_command() const noexcept override { return run_.next_command(); }
 
    private:
     using Base::world_;

@@ -149,10 +149,6 @@ class Simulated : NoCopy {
   /// builds.
   virtual std::function<std::unique_ptr<Episode>(std::uint64_t)> episodes(app::SimRequest request,
                                                                           const MakeEngine& make) const = 0;
-  /// Before their next step(), which then finds the numbers of its world: at most kRobotsTogether of one
-  /// configuration and robot type, in vector registers, those that fit there. Nothing of it shows until then.
-  /// None of them in an engine.
-  virtual void roll_ahead(Episode* const* episodes, int count) const noexcept = 0;
   /// Row by row: gyro, accelerometer, attitude (3 each), battery, wheel angles. `toml`: of the run's log.
   virtual void calibrate(const std::string& toml, const std::vector<RawSample>& raw, double* out) const = 0;
 };

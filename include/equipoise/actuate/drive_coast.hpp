@@ -5,10 +5,6 @@
 // RT-safe: bounded iterations, no allocation.
 #pragma once
 
-#include <cmath>
-
-#include "equipoise/types.hpp"
-
 namespace equipoise {
 
 /// i_avg/i_s for command u. [T] (4.28)-(4.30).
@@ -16,41 +12,20 @@ double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept;
 
 /// The same for a command that is held while the speed changes: what depends on the command alone, computed
 /// once.
-template <class Real>
-class DriveCoastCommandOf {
+class DriveCoastCommand {
  public:
-  DriveCoastCommandOf() = default;
-  DriveCoastCommandOf(double T_r, double u) noexcept;
-  Real mean_current(const Real& omega_r) const noexcept;
+  DriveCoastCommand() = default;
+  DriveCoastCommand(double T_r, double u) noexcept;
+  double mean_current(double omega_r) const noexcept;
 
  private:
-  Real T_r_{0.0};
-  Real sign_{1.0};
-  Real v_{0.0};
-  Real drained_{0.0};     // 1 - exp(-v T_r)
-  Real off_decay_{0.0};   // 1 - exp(-(1 - v) T_r)
-  Real full_decay_{0.0};  // 1 - exp(-T_r)
+  double T_r_ = 0.0;
+  double sign_ = 1.0;
+  double v_ = 0.0;
+  double drained_ = 0.0;     // 1 - exp(-v T_r)
+  double off_decay_ = 0.0;   // 1 - exp(-(1 - v) T_r)
+  double full_decay_ = 0.0;  // 1 - exp(-T_r)
 };
-using DriveCoastCommand = DriveCoastCommandOf<double>;
-
-template <class Real>
-Real DriveCoastCommandOf<Real>::mean_current(const Real& omega_r) const noexcept {
-  using std::log1p;
-  if (all(v_ == 0.0)) return 0.0;  // (4.28)
-  const Real w = limited(sign_ * omega_r, Real(-1.0), Real(1.0));
-  const Real b = 0.5 * (1.0 + w);
-  const Real d = 0.5 * (1.0 - w);
-  const Real flows_on = sign_ * (2.0 * v_ - 1.0 - w);  // (4.29)
-  const auto unlimited = b == 0.0;
-  if (!all(T_r_ > 0.0)) return select(unlimited || v_ > b, flows_on, Real(0.0));  // (4.30), T_r -> 0
-  // (4.27) without its logarithm: v > boundary where exp(-(1 - v) T_r) > b + d exp(-T_r)
-  const auto continuous = unlimited || off_decay_ < d * full_decay_;
-  if (all(continuous)) return flows_on;
-  const Real passes = d / b * drained_;
-  const Real stops =
-      sign_ * 2.0 * (v_ * d - b / T_r_ * log1p(select(continuous, Real(0.0), passes)));  // (4.30)
-  return select(continuous, flows_on, stops);
-}
 
 struct DriveCoastSolution {
   double u = 0.0;         // command, -1 .. 1

@@ -24,32 +24,30 @@ struct Stiction {
   }
 };
 
-/// Axes that do not influence each other, each with its own limit; `mobility`: 1/effective inertia of each.
-template <class Real, int N>
-VecOf<Real, N> uncoupled_coulomb_torque(const VecOf<Real, N>& free_rate, const VecOf<Real, N>& mobility,
-                                        double step_s, const VecOf<Real, N>& mu_c) noexcept {
-  VecOf<Real, N> tau;
-  for (int i = 0; i < N; ++i) {
-    tau(i) = limited<Real>(-free_rate(i) / (step_s * mobility(i)), -mu_c(i), mu_c(i));
-  }
+/// One axis; `mobility`: 1/effective inertia.
+inline double coulomb_torque(double free_rate, double mobility, double step_s, double mu_c) noexcept {
+  return std::clamp(-free_rate / (step_s * mobility), -mu_c, mu_c);
+}
+/// Axes that do not influence each other, each with its own limit.
+inline Vec3 uncoupled_coulomb_torque(const Vec3& free_rate, const Vec3& mobility, double step_s,
+                                     const Vec3& mu_c) noexcept {
+  Vec3 tau;
+  for (int i = 0; i < 3; ++i) tau(i) = coulomb_torque(free_rate(i), mobility(i), step_s, mu_c(i));
   return tau;
 }
 
 /// Coupled axes, each with its own limit: the same rule by projected Gauss-Seidel sweeps.
-template <class Real, int N>
-VecOf<Real, N> coulomb_torque(const VecOf<Real, N>& free_rate, const MatOf<Real, N, N>& mobility,
-                              double step_s, const VecOf<Real, N>& mu_c) noexcept {
+inline Vec2 coulomb_torque(const Vec2& free_rate, const Mat<2, 2>& mobility, double step_s,
+                           const Vec2& mu_c) noexcept {
   constexpr int kSweeps = 20;
-  VecOf<Real, N> tau = VecOf<Real, N>::Zero();
+  Vec2 tau = Vec2::Zero();
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    auto same = tau(0) == tau(0);
-    for (int i = 0; i < N; ++i) {
-      const Real before = tau(i);
-      const Real rate = free_rate(i) + step_s * mobility.row(i).dot(tau);
-      tau(i) = limited<Real>(tau(i) - rate / (step_s * mobility(i, i)), -mu_c(i), mu_c(i));
-      same = same && tau(i) == before;
+    const Vec2 before = tau;
+    for (int i = 0; i < 2; ++i) {
+      const double rate = free_rate(i) + step_s * mobility.row(i).dot(tau);
+      tau(i) = std::clamp(tau(i) - rate / (step_s * mobility(i, i)), -mu_c(i), mu_c(i));
     }
-    if (all(same)) break;  // every further sweep would say the same
+    if (tau == before) break;  // every further sweep would say the same
   }
   return tau;
 }

@@ -14,54 +14,6 @@
 
 namespace equipoise {
 
-/// The bridges of a robot whose diodes drop nothing, under the commands that they hold. A command of a
-/// drive/brake bridge is its duty.
-template <class Real, int N>
-struct BridgesOf {
-  std::array<DriveCoastCommandOf<Real>, N> coast{};  // the integrator asks at many speeds per command
-  std::array<Real, N> brake{};
-  Real stall_torque_N_m{0.0};
-  Real no_load_rad_s{1.0};
-
-  VecOf<Real, N> torque(BridgeType type, const VecOf<Real, N>& wheel_rate_rad_s) const noexcept {
-    VecOf<Real, N> torque;
-    for (int i = 0; i < N; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      const Real omega_r = wheel_rate_rad_s(i) / no_load_rad_s;
-      torque(i) = stall_torque_N_m *
-                  (type == BridgeType::kDriveBrake ? brake[k] - omega_r : coast[k].mean_current(omega_r));
-    }
-    return torque;
-  }
-};
-
-/// The battery that feeds them, as the bridges of one robot draw on it.
-template <class Real, int N>
-struct SupplyOf {
-  Real open_V, resistance_ohm, battery_V;
-  Real motor_ohm, torque_constant_N_m_A, torque_scale, back_emf_scale;  // of every motor
-
-  /// Terminal voltage under the mean supply current; a bridge's is |duty| times the motor current while
-  /// driven.
-  template <class Duty>
-  void draw(const Duty& duty, const VecOf<Real, N>& wheel_rate_rad_s, BridgesOf<Real, N>* bridges) noexcept {
-    using std::abs;
-    Real supply_A(0.0);
-    for (int i = 0; i < N; ++i) {
-      const Real u(duty[i]);
-      const Real omega_r = wheel_rate_rad_s(i) / bridges->no_load_rad_s;
-      supply_A += abs(u * (battery_V / motor_ohm) * (u - omega_r));
-    }
-    battery_V = open_V - resistance_ohm * supply_A;
-    feed(bridges);
-  }
-  /// What follows from the battery's voltage.
-  void feed(BridgesOf<Real, N>* bridges) const noexcept {
-    bridges->stall_torque_N_m = torque_scale * torque_constant_N_m_A * (battery_V / motor_ohm);
-    bridges->no_load_rad_s = battery_V / torque_constant_N_m_A / back_emf_scale;
-  }
-};
-
 /// Outputs of a bridge that switch on later than off lose that much of each period; at full duty none
 /// switches.
 inline double switched_duty(double duty, double lost) noexcept {
@@ -76,9 +28,11 @@ class SimulatedMotors {
   SimulatedMotors(const MotorParameters& motor, const Calibration& calibration, const WorldParams& world)
       : motor_(motor),
         calibration_(calibration),
-        supply_{world.battery_V,      world.battery_resistance_ohm, world.battery_V,
-                motor.resistance_ohm, motor.torque_constant_N_m_A,  world.actual.torque,
-                world.actual.back_emf},
+        open_V_(world.battery_V),
+        battery_ohm_(world.battery_resistance_ohm),
+        battery_V_(world.battery_V),
+        torque_scale_(world.actual.torque),
+        back_emf_scale_(world.actual.back_emf),
         diode_drop_V_(world.diode_drop_V),
         lost_duty_((world.bridge_on_delay_s - world.bridge_off_delay_s) * motor.pwm_hz) {
     supplied();
@@ -90,68 +44,71 @@ class SimulatedMotors {
       command_.duty[i] = switched_duty(command.duty[i], lost_duty_);
       const double duty = calibration_.motor_sign[i] * command_.duty[i];
       if (motor_.bridge == BridgeType::kDriveBrake) {
-        bridges_.brake[i] = duty;
+        brake_[i] = duty;
       } else if (diode_drop_V_ == 0.0) {
-        bridges_.coast[i] = DriveCoastCommand(motor_.T_r(), duty);
+        coast_[i] = DriveCoastCommand(motor_.T_r(), duty);
       } else {
-        held_with_drop_[i] = DriveCoastDropCommand(motor_.T_r(), duty);
+        coast_with_drop_[i] = DriveCoastDropCommand(motor_.T_r(), duty);
       }
     }
   }
   bool enabled() const noexcept { return command_.enable; }
-  double battery_V() const noexcept { return supply_.battery_V; }
+  double battery_V() const noexcept { return battery_V_; }
 
   Vec<N> torque(const Vec<N>& wheel_rate_rad_s) const noexcept {
     if (!command_.enable) return Vec<N>::Zero();  // all switches open: the current decays at once
-    if (!drops()) return bridges_.torque(motor_.bridge, wheel_rate_rad_s);
     Vec<N> torque;
-    for (int i = 0; i < N; ++i) {
-      const double omega_r = wheel_rate_rad_s(i) / bridges_.no_load_rad_s;
-      torque(i) = bridges_.stall_torque_N_m *
-                  held_with_drop_[static_cast<std::size_t>(i)].mean_current(omega_r, diodes_oppose_);
-    }
+    for (int i = 0; i < N; ++i)
+      torque(i) = stall_torque_N_m_ * mean_current(static_cast<std::size_t>(i), wheel_rate_rad_s(i));
     return torque;
   }
-  /// Where they drop nothing and are enabled: all there is to a torque.
-  const BridgesOf<double, N>* bridges() const noexcept {
-    return command_.enable && !drops() ? &bridges_ : nullptr;
-  }
-  BridgeType type() const noexcept { return motor_.bridge; }
-  const SupplyOf<double, N>& supply() const noexcept { return supply_; }
 
+  /// The battery's terminal voltage under the mean supply current; a bridge's is |duty| times the motor
+  /// current while driven.
   void update_battery(const Vec<N>& wheel_rate_rad_s) noexcept {
-    if (supply_.resistance_ohm == 0.0) return;
-    if (command_.enable) {
-      supply_.draw(command_.duty, wheel_rate_rad_s, &bridges_);
-    } else {
-      supply_.battery_V = supply_.open_V;
+    if (battery_ohm_ == 0.0) return;
+    double supply_A = 0.0;
+    for (int i = 0; command_.enable && i < N; ++i) {
+      const double u = command_.duty[i];
+      const double omega_r = wheel_rate_rad_s(i) / no_load_rad_s_;
+      supply_A += std::abs(u * (battery_V_ / motor_.resistance_ohm) * (u - omega_r));
     }
+    battery_V_ = open_V_ - battery_ohm_ * supply_A;
     supplied();
   }
 
   /// Torque lost per rad/s of a wheel while its bridge drives. (5.12)
-  double damping_N_m_s() const noexcept {
-    return supply_.torque_scale * supply_.back_emf_scale * motor_.k2();
-  }
+  double damping_N_m_s() const noexcept { return torque_scale_ * back_emf_scale_ * motor_.k2(); }
 
  private:
-  /// Diodes carry the current of a drive/coast bridge alone.
-  bool drops() const noexcept { return diode_drop_V_ != 0.0 && motor_.bridge == BridgeType::kDriveCoast; }
+  /// Over the stall current. Diodes carry the current of a drive/coast bridge alone.
+  double mean_current(std::size_t i, double wheel_rate_rad_s) const noexcept {
+    const double omega_r = wheel_rate_rad_s / no_load_rad_s_;
+    if (motor_.bridge == BridgeType::kDriveBrake) return brake_[i] - omega_r;
+    if (diode_drop_V_ == 0.0) return coast_[i].mean_current(omega_r);
+    return coast_with_drop_[i].mean_current(omega_r, diodes_oppose_);
+  }
   /// What follows from the battery's voltage.
   void supplied() noexcept {
-    supply_.feed(&bridges_);
-    diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / supply_.battery_V;
+    stall_torque_N_m_ = torque_scale_ * motor_.torque_constant_N_m_A * (battery_V_ / motor_.resistance_ohm);
+    no_load_rad_s_ = battery_V_ / motor_.torque_constant_N_m_A / back_emf_scale_;
+    diodes_oppose_ = 1.0 + 2.0 * diode_drop_V_ / battery_V_;
   }
 
   MotorParameters motor_;
   Calibration calibration_;
-  SupplyOf<double, N> supply_;
+  double open_V_, battery_ohm_, battery_V_;
+  double torque_scale_, back_emf_scale_;  // of every motor
   double diode_drop_V_;
   double lost_duty_;
+  double stall_torque_N_m_ = 0.0;
+  double no_load_rad_s_ = 1.0;
   double diodes_oppose_ = 1.0;
   MotorCommand command_{};
-  BridgesOf<double, N> bridges_;
-  std::array<DriveCoastDropCommand, N> held_with_drop_{};
+  // The commands held, each of one kind of bridge: the integrator asks at many speeds per command.
+  std::array<double, N> brake_{};
+  std::array<DriveCoastCommand, N> coast_{};
+  std::array<DriveCoastDropCommand, N> coast_with_drop_{};
 };
 
 }  // namespace equipoise

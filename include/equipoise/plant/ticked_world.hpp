@@ -30,9 +30,6 @@ class TickedWorld : public SimulatedDevices {
 
   bool held() const noexcept { return held_; }
   double battery_V() const noexcept { return motors_.battery_V(); }
-  BridgeType bridge() const noexcept { return motors_.type(); }
-  double step_s() const noexcept { return common_.step_s; }
-  int steps_per_tick() const noexcept { return static_cast<int>(std::lround(kTickS / common_.step_s)); }
 
  protected:
   TickedWorld(const MotorParameters& motor, const Calibration& calibration, const WorldParams& world)
@@ -55,7 +52,7 @@ class TickedWorld : public SimulatedDevices {
  private:
   void advance_tick(const MotorCommand& command) {
     if (command.enable) held_ = false;
-    const int steps = steps_per_tick();
+    const int steps = static_cast<int>(std::lround(kTickS / common_.step_s));
     const double taken_at = common_.actuation_steps();
     for (int i = 0; i < steps && !held_; ++i) {
       const double part = taken_at - i;

@@ -110,13 +110,6 @@ struct WorldParams {
   double rolling_resistance = 0.0;         // of the weight
   ActualScales actual;
 
-  /// A level floor, nobody who pushes, bridges that follow at once and drop nothing, sensors of now.
-  bool plain() const noexcept {
-    return pushes.empty() && random_pushes.every_s == 0.0 && !floor.uneven() && floor_slope_rad.isZero(0.0) &&
-           rolling_resistance == 0.0 && stiction.static_ratio == 1.0 && friction_scale == Vec2::Ones() &&
-           diode_drop_V == 0.0 && bridge_on_delay_s == bridge_off_delay_s && actuation_steps() == 0.0 &&
-           missed_tick_share == 0.0 && com_offset_rad.isZero(0.0) && !aged();
-  }
   /// A sensor reports the past.
   bool aged() const noexcept {
     return imu_repeat_share > 0.0 || gyro_age_s() > 0.0 || accel_age_s() > 0.0 || encoder_sample_age_s > 0.0;

@@ -11,9 +11,6 @@ class PlantBackend : public Backend {
  public:
   explicit PlantBackend(SimulatedDevices& world) : world_(world) {}
 
-  /// What the next tick is advanced under.
-  const MotorCommand& command() const noexcept { return command_; }
-
  private:
   int wait_tick(std::int64_t* now_ns) override {
     world_.advance(command_);

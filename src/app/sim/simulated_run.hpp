@@ -24,8 +24,6 @@ class SimulatedRun : NoCopy {
 
   /// What is asked for from the next tick on.
   Script& script() noexcept { return options_.script; }
-  /// What the world is advanced under in the next step; none will be: it has ended.
-  const MotorCommand* next_command() const noexcept { return done_ ? nullptr : &backend_.command(); }
   bool lost() const noexcept { return judge_.lost() || judge_.refused(); }
 
   SimSummary summary() const;

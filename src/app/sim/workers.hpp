@@ -2,19 +2,17 @@
 // -> out: all done when each() returns; the first exception ends the rest and is thrown again. Each thread
 // has its own share of the numbers, the same in every round, so that its cache keeps what belongs to them;
 // who is done takes from the others' shares. Jobs that share nothing give the same results with any number of
-// threads. One caller at a time, who may leave a round to the others meanwhile: start(), finish().
+// threads. One caller at a time.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <functional>
 #include <mutex>
 #include <thread>
-#include <utility>
 #include <vector>
 
 namespace equipoise::app {
@@ -42,28 +40,20 @@ class Workers {
   int threads() const noexcept { return static_cast<int>(shares_.size()); }
 
   void each(int count, const std::function<void(int)>& job) {
-    finish();
-    share_out(count, job);
-    if (count > 1) open();
-    complete();
-  }
-
-  /// The others begin; the caller goes about its own business, and `job` lives on, until finish(), which any
-  /// other call is, too.
-  void start(int count, const std::function<void(int)>& job) {
-    finish();
-    share_out(count, job);
-    started_ = true;
-    open();
-  }
-  /// What is left of what was started.
-  void finish() {
-    if (std::exchange(started_, false)) complete();
+    {
+      const std::lock_guard lock(mutex_);
+      share_out(count, job);
+      ++round_;
+      at_work_ = others_.size();
+    }
+    news_.notify_all();
+    work(0);
+    std::unique_lock lock(mutex_);
+    idle_.wait(lock, [this] { return at_work_ == 0; });
+    if (failure_) std::rethrow_exception(failure_);
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   /// Of one thread; on a cache line of its own.
   struct alignas(64) Share {
     std::atomic<int> next{0};
@@ -82,66 +72,6 @@ class Workers {
     failed_ = false;
   }
 
-  void complete() {
-    work(0);
-    close();
-    if (failure_) std::rethrow_exception(failure_);
-  }
-
-  // What state_ counts: rounds, threads at work beside the caller, and whether more may join them.
-  static constexpr std::uint64_t kOpen = 1;
-  static constexpr std::uint64_t kOneAtWork = 2;
-  static constexpr std::uint64_t kOneRound = 1U << 16U;
-
-  /// For so long a thread stays awake: to be woken takes as long as many a job, and a caller that steps
-  /// robots comes back soon.
-  static constexpr std::chrono::microseconds kAwake{200};
-
-  static bool soon(const std::function<bool()>& condition) {
-    if (condition()) return true;
-    for (const auto end = Clock::now() + kAwake; Clock::now() < end;) {
-      std::this_thread::yield();
-      if (condition()) return true;
-    }
-    return false;
-  }
-
-  void open() {
-    state_ += kOneRound + kOpen;
-    if (asleep_ == 0) return;
-    const std::lock_guard lock(mutex_);
-    news_.notify_all();
-  }
-
-  /// Who comes now is too late; who is at work is waited for.
-  void close() {
-    state_ &= ~kOpen;
-    const auto idle = [this] { return state_ % kOneRound == 0; };
-    if (soon(idle)) return;
-    std::unique_lock lock(mutex_);
-    caller_sleeps_ = true;
-    idle_.wait(lock, idle);
-    caller_sleeps_ = false;
-  }
-
-  /// True once per round, while it is open.
-  bool join(std::uint64_t* seen) {
-    std::uint64_t state = state_;
-    while ((state & kOpen) != 0 && state / kOneRound != *seen) {
-      if (!state_.compare_exchange_weak(state, state + kOneAtWork)) continue;
-      *seen = state / kOneRound;
-      return true;
-    }
-    return false;
-  }
-
-  void leave() {
-    state_ -= kOneAtWork;
-    if (!caller_sleeps_) return;
-    const std::lock_guard lock(mutex_);
-    idle_.notify_one();
-  }
-
   void work(std::size_t self) noexcept {
     for (std::size_t k = 0; k < shares_.size(); ++k) {
       Share& share = shares_[(self + k) % shares_.size()];
@@ -158,34 +88,28 @@ class Workers {
   }
 
   void serve(std::size_t self) {
-    std::uint64_t seen = 0;
-    for (;;) {
-      bool joined = false;
-      const auto called = [&] { return (joined = join(&seen)) || closing_; };
-      if (!soon(called)) {
-        std::unique_lock lock(mutex_);
-        ++asleep_;
-        news_.wait(lock, called);
-        --asleep_;
-      }
-      if (!joined) return;
+    std::unique_lock lock(mutex_);
+    for (std::uint64_t seen = 0;;) {
+      news_.wait(lock, [&] { return round_ != seen || closing_; });
+      if (closing_) return;
+      seen = round_;
+      lock.unlock();
       work(self);
-      leave();
+      lock.lock();
+      if (--at_work_ == 0) idle_.notify_one();
     }
   }
 
   std::vector<Share> shares_;
   std::vector<std::thread> others_;
-  std::atomic<std::uint64_t> state_{0};
-  const std::function<void(int)>* job_ = nullptr;
-  bool started_ = false;  // and not finished
-  std::atomic<bool> failed_{false};
-  std::exception_ptr failure_;
   std::mutex mutex_;
   std::condition_variable news_, idle_;
-  std::atomic<int> asleep_{0};
-  std::atomic<bool> caller_sleeps_{false};
-  std::atomic<bool> closing_{false};
+  std::uint64_t round_ = 0;
+  std::size_t at_work_ = 0;  // threads beside the caller
+  bool closing_ = false;
+  const std::function<void(int)>* job_ = nullptr;
+  std::atomic<bool> failed_{false};
+  std::exception_ptr failure_;
 };
 
 }  // namespace equipoise::app

@@ -24,12 +24,6 @@ struct MbbrDriveParams {
   double wheel_grip = 0.0;              // friction coefficient at the ball; 0: wheels never slip
   double gearbox_friction_share = 0.0;  // of the drive's friction that sits before the contact
   Vec2 com_offset_rad = Vec2::Zero();   // the wheels hang this far over
-
-  /// Motors, wheels and gears are as drawn.
-  bool even() const noexcept {
-    return wheel_torque_scale == Vec3::Ones() && gear.play_rad == 0.0 && roller_tilt_rad == 0.0 &&
-           roller_slip_N_m == 0.0 && wheel_grip == 0.0 && com_offset_rad.isZero(0.0);
-  }
 };
 
 /// Contact normals of the wheels, columns, body axes.

@@ -38,8 +38,7 @@ Vec3 MbbrEngineWorld::torque_B(const Vec3& rate, const Vec3& others, double h) n
   if (!drive_.slips()) {
     const Vec3 wheels = drive_.wheel_torques(motors_, rate);
     const Vec3 free = others + h * mobility_.cwiseProduct(drive_.torque_B(wheels, -viscous * rate));
-    return drive_.torque_B(wheels,
-                           -viscous * rate + uncoupled_coulomb_torque<double, 3>(free, mobility_, h, limit));
+    return drive_.torque_B(wheels, -viscous * rate + uncoupled_coulomb_torque(free, mobility_, h, limit));
   }
   const double beyond = drive_.share_beyond();
   Mat<6, 6> response = Mat<6, 6>::Identity();  // the floor is the engine's

@@ -40,19 +40,6 @@ struct MbbrParameters {
   }
 };
 
-/// Ball rate relative to the body, body axes, to the wheels'; and from wheel torques to the torque on the
-/// ball. `ratio`: r / r_w. (5.3), (5.4)
-template <class Real>
-VecOf<Real, 3> wheels_from_ball(const Real& ratio, const MatOf<Real, 3, 3>& T_ob,
-                                const VecOf<Real, 3>& ball_B) noexcept {
-  return ratio * (T_ob.transpose() * ball_B);
-}
-template <class Real>
-VecOf<Real, 3> axes_from_wheels(const Real& ratio, const MatOf<Real, 3, 3>& T_ob,
-                                const VecOf<Real, 3>& wheels) noexcept {
-  return ratio * (T_ob * wheels);
-}
-
 /// Maps between the three wheels and the body axes, [T] (5.2)-(5.4), (5.14).
 class MbbrKinematics {
  public:
@@ -65,18 +52,14 @@ class MbbrKinematics {
   Vec3 ball_from_wheels(const Vec3& wheels) const noexcept {
     return (1.0 / ratio_) * (T_ob_inverse_.transpose() * wheels);
   }
-  Vec3 wheels_from_ball(const Vec3& ball_B) const noexcept {
-    return equipoise::wheels_from_ball<double>(ratio_, T_ob_, ball_B);
-  }
+  Vec3 wheels_from_ball(const Vec3& ball_B) const noexcept { return ratio_ * (T_ob_.transpose() * ball_B); }
   /// Friction acts about the body axes, [T] section 5.3.
   template <class Compensation>
   Vec3 friction_input(const Compensation& c, const Vec3& wheel_rates) const noexcept {
     return c.compensate(ball_from_wheels(wheel_rates));
   }
   /// Torque on the ball (or input u), body axes, from wheel torques (or duties). (5.4), (5.14)
-  Vec3 axes_from_wheels(const Vec3& wheels) const noexcept {
-    return equipoise::axes_from_wheels<double>(ratio_, T_ob_, wheels);
-  }
+  Vec3 axes_from_wheels(const Vec3& wheels) const noexcept { return ratio_ * (T_ob_ * wheels); }
   Vec3 wheels_from_axes(const Vec3& axes_B) const noexcept {
     return (1.0 / ratio_) * (T_ob_inverse_ * axes_B);
   }
@@ -108,12 +91,8 @@ struct MbbrEstimate {
 };
 
 /// Ball rates (yaw frame) -> velocity of the ball's centre in the same frame, [T] (5.9).
-template <class Real>
-VecOf<Real, 2> ball_velocity(const Real& r, const VecOf<Real, 2>& phi_dot) noexcept {
-  return {r * phi_dot.y(), -r * phi_dot.x()};
-}
 inline Vec2 ball_velocity(double r, const Vec2& phi_dot) noexcept {
-  return ball_velocity<double>(r, phi_dot);
+  return {r * phi_dot.y(), -r * phi_dot.x()};
 }
 inline Vec2 ball_rate(double r, const Vec2& velocity) noexcept {
   return {-velocity.y() / r, velocity.x() / r};

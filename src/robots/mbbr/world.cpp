@@ -62,8 +62,7 @@ MbbrWorld::MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor,
       here_(s_),
       sensors_(calibration, world.common, Mbbr::kWheels, start_noise_, s_.segment<3>(kTheta)),
       uneven_(world.common.floor.uneven()),
-      limited_(floor_.limited() || drive_.slips()),
-      plain_(world.common.plain() && world.drive.even() && !floor_.limited()) {}
+      limited_(floor_.limited() || drive_.slips()) {}
 
 MbbrWorld::Here MbbrWorld::near(const State& s) const noexcept {
   return {here_, s, s(kTheta + 2) - s_(kTheta + 2)};
@@ -75,8 +74,8 @@ void MbbrWorld::arrive(const State& s) noexcept {
 }
 
 Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& relative_rate_B) noexcept {
-  Vec3 limit = sliding_friction_N_m<double>(mu_c * world.coulomb_scale, world.yaw_friction_scale.x(),
-                                            world.yaw_friction_scale.y(), relative_rate_B);
+  Vec3 limit = Vec3::Constant(mu_c * world.coulomb_scale);
+  limit.z() *= world.yaw_friction_scale(relative_rate_B.z() >= 0.0 ? 0 : 1);
   for (int i = 0; i < 3; ++i) limit(i) *= world.common.stiction.factor(relative_rate_B(i));
   return limit;
 }
@@ -107,7 +106,7 @@ void MbbrWorld::push_and_pull(Instant* now, const Vec2& push_W) const noexcept {
 }
 
 void MbbrWorld::rolling(Instant* now, const Vec2& push_W, const Vec3& friction_B) const noexcept {
-  now->drive(wheels(), viscous_N_m_s(), friction_B);
+  now->driven(drive_, motors_, viscous_N_m_s(), friction_B);
   push_and_pull(now, push_W);
   now->roll(dynamics_);
 }
@@ -140,7 +139,7 @@ Vec3 MbbrWorld::friction_limit_B(const Instant& now) const noexcept {
 Vec3 MbbrWorld::coulomb_torque_B(const Instant& free) const noexcept {
   if (!common_.friction) return Vec3::Zero();
   const double h = common_.step_s;
-  return uncoupled_coulomb_torque<double, 3>(free.relative_after(h), mobility_, h, friction_limit_B(free));
+  return uncoupled_coulomb_torque(free.relative_after(h), mobility_, h, friction_limit_B(free));
 }
 
 void MbbrWorld::slip_forces(Instant* now, const Vec2& push_W, const MbbrFriction& f) const noexcept {
@@ -149,7 +148,7 @@ void MbbrWorld::slip_forces(Instant* now, const Vec2& push_W, const MbbrFriction
     const Vec3 beyond_B = f.axes_B - drive_.share_beyond() * viscous_N_m_s() * now->relative_B;
     now->loads.tau_B = drive_.on_ball_B(f.wheels) + beyond_B;
   } else {
-    now->drive(wheels(), viscous_N_m_s(), f.axes_B);
+    now->driven(drive_, motors_, viscous_N_m_s(), f.axes_B);
   }
 }
 
@@ -185,14 +184,11 @@ MbbrFloorForce MbbrWorld::needed(const Instant& now, const MbbrAccelerations& a)
 }
 
 Felt MbbrWorld::felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept {
-  return felt(m.omega_B, -dynamics_.accelerometer_B(m, a) + ground_.lift_m_s2() * m.R().row(2).transpose());
-}
-
-Felt MbbrWorld::felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept {
   Felt felt;
   felt.time_s = time_s_;
-  felt.omega_B_rad_s = omega_B;
-  felt.specific_force_B_m_s2 = specific_force_B;
+  felt.omega_B_rad_s = m.omega_B;
+  felt.specific_force_B_m_s2 =
+      -dynamics_.accelerometer_B(m, a) + ground_.lift_m_s2() * m.R().row(2).transpose();
   felt.wheel_angle_rad.head<3>() =
       kinematics_.wheels_from_ball(s_.segment<3>(kRelative)) + drive_.encoder_offset_rad();
   return felt;
@@ -233,7 +229,6 @@ MbbrSlipAccelerations MbbrWorld::slip_accelerations(const Here& here, const Vec2
 }
 
 void MbbrWorld::step(double h) noexcept {
-  rolled_ = false;
   if (uneven_) {
     const Vec2 slip = s_.segment<2>(kSlip);
     ground_.begin_step(ball_velocity(robot_.r, Vec2(s_.segment<2>(kPhi))),
@@ -250,14 +245,14 @@ bool MbbrWorld::roll(const Vec2& push, double h) noexcept {
   Instant free(here_);
   rolling(&free, push, Vec3::Zero());
   friction_.axes_B = coulomb_torque_B(free);
-  const Instant now = free.with_friction(dynamics_, wheels(), friction_.axes_B);
+  const Instant now = free.with_friction(dynamics_, drive_, friction_.axes_B);
   if (limited_ && !contacts_hold(now, friction_.axes_B)) return false;
   if (sensors_.aged()) sensors_.feel(felt(now.motion, now.a));
   load_wheels(now, now.a, drive_.contact_torques(now.wheel_torque, now.viscous_B + friction_.axes_B));
-  arrive(rk4_step(s_, now.derivative(wheels()), h, [&](const State& s) {
+  arrive(rk4_step(s_, now.derivative(drive_), h, [&](const State& s) {
     Instant then(near(s));
     rolling(&then, push, friction_.axes_B);
-    return then.derivative(wheels());
+    return then.derivative(drive_);
   }));
   time_s_ += h;
   return true;
@@ -294,41 +289,13 @@ void MbbrWorld::end_tick() noexcept {
   motors_.update_battery(kinematics_.wheels_from_ball(here_.relative_B));
 }
 
-bool MbbrWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexcept {
-  if (!plain_ || !command.enable || slipping_) return false;
-  held_ = false;
-  motors_.command(command);
-  Eigen::Map<State>(robot->state) = s_;
-  robot->bodies = bodies(robot_);
-  Eigen::Map<Vec3>(robot->mobility) = mobility_;
-  robot->viscous_N_m_s = viscous_N_m_s();
-  robot->coulomb_N_m = common_.friction ? robot_.mu_c * world_.coulomb_scale : 0.0;
-  robot->yaw_positive = world_.yaw_friction_scale.x();
-  robot->yaw_negative = world_.yaw_friction_scale.y();
-  robot->ratio = robot_.r / robot_.r_w;
-  Eigen::Map<Mat3>(robot->T_ob) = kinematics_.T_ob();
-  robot->bridges = *motors_.bridges();
-  robot->supply = motors_.supply();
-  std::copy_n(command.duty, Mbbr::kWheels, robot->duty);
-  return true;
-}
-
-void MbbrWorld::end_rolling(const Rolling& robot) noexcept {
-  s_ = Eigen::Map<const State>(robot.state);
-  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += common_.step_s;
-  rolled_ = world_.process_noise_sigma.isZero(0.0);
-  rolled_force_B_ = Eigen::Map<const Vec3>(robot.specific_force_B);
-  end_tick();
-}
-
 Felt MbbrWorld::felt_now() const noexcept {
-  if (rolled_) return felt(s_.segment<3>(kOmega), rolled_force_B_);
   if (slipping_) {
     return felt(here_.motion, felt_as_rolling(slip_accelerations(here_, push_now()), robot_.r));
   }
   Instant now(here_);
   rolling(&now, push_now(), Vec3::Zero());
-  if (!held_) now = now.with_friction(dynamics_, wheels(), coulomb_torque_B(now));
+  if (!held_) now = now.with_friction(dynamics_, drive_, coulomb_torque_B(now));
   return felt(now.motion, now.a);
 }
 

@@ -6,8 +6,7 @@
 
 #include "equipoise/plant/engine.hpp"
 #include "equipoise/plant/ticked_world.hpp"
-#include "robots/mbbr/drive.hpp"
-#include "robots/mbbr/rolling.hpp"
+#include "robots/mbbr/instant.hpp"
 #include "robots/mbbr/slipping.hpp"
 
 namespace equipoise {
@@ -34,15 +33,8 @@ Vec3 friction_limit_N_m(const MbbrWorldParams& world, double mu_c, const Vec3& r
 
 class MbbrWorld : public TickedWorld<Mbbr::kWheels> {
  public:
-  using Rolling = MbbrRollingOf<double>;
-
   MbbrWorld(const MbbrParameters& robot, const MotorParameters& motor, const Calibration& calibration,
             const MbbrWorldParams& world);
-
-  /// The same tick in two halves, where nothing is on that MbbrRollingOf leaves out: what the steps depend
-  /// on, if so; and their end. Between them roll() or roll_together().
-  bool begin_rolling(const MotorCommand& command, Rolling* robot) noexcept;
-  void end_rolling(const Rolling& robot) noexcept;
 
   RawSample sense() override;
   void without_attitude() noexcept { sensors_.without_attitude(); }
@@ -53,21 +45,9 @@ class MbbrWorld : public TickedWorld<Mbbr::kWheels> {
   Vec3 wheel_slip_rad_s() const noexcept;               // wheels ahead of the ball
 
  private:
-  using State = MbbrStateOf<double>;
-  using Here = MbbrHereOf<double>;
-  using Instant = MbbrInstantOf<double>;
-  /// The drive with its motors.
-  struct Wheels {
-    const MbbrDrive& drive;
-    const MbbrDrive::Motors& motors;
-
-    Vec3 wheel_torques(const Vec3& rate_B) const noexcept { return drive.wheel_torques(motors, rate_B); }
-    Vec3 torque_B(const Vec3& wheel_torque, const Vec3& friction_B) const noexcept {
-      return drive.torque_B(wheel_torque, friction_B);
-    }
-    Vec3 seen_rate_B(const Vec3& rate_B) const noexcept { return drive.seen_rate_B(rate_B); }
-  };
-  Wheels wheels() const noexcept { return {drive_, motors_}; }
+  using State = MbbrState;
+  using Here = MbbrHere;
+  using Instant = MbbrInstant;
   double viscous_N_m_s() const noexcept;
   Here near(const State& s) const noexcept;  // within a step from here
   /// Of an instant whose motion is known: forces, and accelerations of a ball that rolls.
@@ -84,7 +64,6 @@ class MbbrWorld : public TickedWorld<Mbbr::kWheels> {
   MbbrFloorForce needed(const Instant& now, const MbbrAccelerations& a) const noexcept;
   Vec2 push_now() const noexcept { return push_force_W(common_, time_s_); }
   Felt felt(const MbbrMotion& m, const MbbrAccelerations& a) const noexcept;
-  Felt felt(const Vec3& omega_B, const Vec3& specific_force_B) const noexcept;
   Felt felt_now() const noexcept;
   void step(double h) noexcept override;
   bool roll(const Vec2& push_W, double h) noexcept;
@@ -108,10 +87,7 @@ class MbbrWorld : public TickedWorld<Mbbr::kWheels> {
   SimulatedSensors sensors_;
   bool uneven_;
   bool limited_;  // a contact may give way
-  bool plain_;    // as MbbrRollingOf has it
   bool slipping_ = false;
-  bool rolled_ = false;  // the last tick, and what is felt since is known
-  Vec3 rolled_force_B_ = Vec3::Zero();
   MbbrFriction friction_;            // of the last step
   Vec3 rotor_rad_s_ = Vec3::Zero();  // while anything slips
 };

@@ -32,7 +32,7 @@ void MipEngineWorld::step() {
     Vec2 limit = robot_.mu_c * d.friction_gain;
     for (int i = 0; i < 2; ++i) limit(i) *= world_.common.stiction.factor(rate(i));
     const Vec2 free = rate + h * (others_rad_s2_ + mobility_ * torque);
-    torque += coulomb_torque<double, 2>(free, mobility_, h, limit);
+    torque += coulomb_torque(free, mobility_, h, limit);
   }
   body_.drive(Vec3(torque.x(), torque.y(), 0.0), encoders());
   others_rad_s2_ = (wheel_rates() - rate) / h - mobility_ * torque;

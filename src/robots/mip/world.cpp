@@ -2,31 +2,25 @@
 
 #include <algorithm>
 
+#include "equipoise/plant/coulomb.hpp"
+#include "equipoise/plant/integrator.hpp"
+
 namespace equipoise {
 namespace {
 
 constexpr double kRollingStart_m_s = 0.005;  // below it rolling resistance fades
 
-using namespace mip_at;  // NOLINT(google-build-using-namespace): the places in the state
+enum : int { kTheta, kPhi, kPsi, kThetaDot, kPhiDot, kPsiDot, kPosition };  // in the state
 
 // A hand that lifts the robot tips it slowly, our estimate.
 constexpr double kHandRate_rad_s = 0.1;
 constexpr double kHeldTilt_rad = 0.3;
 
-MipRollingOf<double> start(const MipParameters& robot, const MipWorldParams& world, NoiseStream& noise) {
-  MipRollingOf<double> now{};
-  now.state[kTheta] = noise.gaussian(world.common.initial_tilt_rad);
-  now.state[kPsi] = noise.gaussian(world.common.initial_tilt_rad);
-  now.bodies = bodies(robot);
-  now.yaw_to_wheel = robot.yaw_to_wheel();
-  now.viscous_N_m_s = world.common.friction ? robot.mu_v : 0.0;
-  for (int i = 0; i < 2; ++i) {
-    now.coulomb_N_m[i] = world.common.friction ? robot.mu_c * world.drivetrain.friction_gain(i) : 0.0;
-    now.motor_gain[i] = world.drivetrain.motor_gain(i);
-    now.engaged[i] = 1.0;
-  }
-  now.gear = world.drivetrain.gear;
-  return now;
+Vec<8> start_state(NoiseStream& noise, double sigma) {
+  Vec<8> s = Vec<8>::Zero();
+  s(kTheta) = noise.gaussian(sigma);
+  s(kPsi) = noise.gaussian(sigma);
+  return s;
 }
 
 }  // namespace
@@ -67,11 +61,36 @@ MipWorld::MipWorld(const MipParameters& robot, const MotorParameters& motor, con
       dynamics_(robot_),
       ground_{Ground(world.common.floor, robot_.r, world.common.seed),
               Ground(world.common.floor, robot_.r, world.common.seed)},
-      now_(start(robot_, world, start_noise_)),
-      sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s()(kTheta), 0.0, s()(kPsi))),
-      uneven_(world.common.floor.uneven()),
-      plain_(world.common.plain() && world.lift_at_s < 0.0) {
-  Eigen::Map<Mat<2, 2>>(now_.mobility) = wheel_mobility(robot_);
+      mobility_(wheel_mobility(robot_)),
+      s_(start_state(start_noise_, world.common.initial_tilt_rad)),
+      sensors_(calibration, world.common, Mip::kWheels, start_noise_, Vec3(s_(kTheta), 0.0, s_(kPsi))),
+      uneven_(world.common.floor.uneven()) {}
+
+MipWorld::Facing MipWorld::facing(const State& s) noexcept { return {Turn(s(kTheta)), Turn(s(kPsi))}; }
+
+Vec2 MipWorld::wheel_rates(const State& s) const noexcept {
+  return kinematics_.wheels(s(kPhiDot), s(kPsiDot));
+}
+
+double MipWorld::speed(const State& s) const noexcept {
+  return lifted() ? 0.0 : -robot_.r * (s(kPhiDot) + s(kThetaDot));
+}
+
+/// Motor and viscous friction, as far as the teeth touch.
+Vec2 MipWorld::gear_torque(const Vec2& wheel_rates) const noexcept {
+  const double viscous = common_.friction ? robot_.mu_v : 0.0;
+  const Vec2 motor = motors_.torque(wheel_rates).cwiseProduct(world_.drivetrain.motor_gain);
+  return (motor - viscous * wheel_rates).cwiseProduct(engaged_);
+}
+
+/// Coulomb friction of each wheel over a whole step from here.
+Vec2 MipWorld::friction_torque(const Facing& facing, const Vec2& gear_torque) const noexcept {
+  if (!common_.friction) return Vec2::Zero();
+  const State next = s_ + common_.step_s * derivative(s_, facing, accelerations(s_, facing, gear_torque));
+  const Vec2 rates = wheel_rates(s_);
+  Vec2 limit = common_.friction_now(time_s_) * (robot_.mu_c * world_.drivetrain.friction_gain);
+  for (int i = 0; i < Mip::kWheels; ++i) limit(i) *= common_.stiction.factor(rates(i));
+  return coulomb_torque(wheel_rates(next), mobility_, common_.step_s, limit);
 }
 
 Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept {
@@ -79,7 +98,8 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
     const Vec2 wheel = wheel_torque / (robot_.I_w1 + robot_.I_r);
     return {0.0, kinematics_.phi(wheel), 0.0};
   }
-  Vec3 a = MipLevelOf<double>{dynamics_}.accelerations(s, facing, wheel_torque);
+  Vec3 a = dynamics_.accelerations({s(kTheta), s(kThetaDot), s(kPhiDot), s(kPsiDot)}, facing.tilt,
+                                   wheel_torque.x() + wheel_torque.y(), wheel_torque.x() - wheel_torque.y());
   const Vec2 push_W = push_force_W(common_, time_s_);
   const Vec2& slope = common_.floor_slope_rad;
   const double resistance = common_.rolling_resistance;
@@ -109,24 +129,24 @@ Vec3 MipWorld::accelerations(const State& s, const Facing& facing, const Vec2& w
   return a;
 }
 
-Vec2 MipWorld::friction_limit(const Vec2& wheel_rates) const noexcept {
-  const Stiction& stiction = common_.stiction;
-  const double scale = common_.friction_now(time_s_);
-  return {scale * now_.coulomb_N_m[0] * stiction.factor(wheel_rates.x()),
-          scale * now_.coulomb_N_m[1] * stiction.factor(wheel_rates.y())};
+MipWorld::State MipWorld::derivative(const State& s, const Facing& facing,
+                                     const Vec3& accelerations) const noexcept {
+  State d;
+  d.segment<3>(kTheta) = s.segment<3>(kThetaDot);
+  d.segment<3>(kThetaDot) = accelerations;
+  d.segment<2>(kPosition) = facing.heading(Vec2(0.0, speed(s)));
+  return d;
 }
 
 /// Each wheel carries half the weight over the floor where it is.
 void MipWorld::feel_ground(double h) noexcept {
-  const Turn heading(s()(kPsi));
-  const double speed =
-      lifted() ? 0.0 : -robot_.r * (s()(kPhiDot) + s()(kThetaDot));  // along the yaw frame's y
+  const Turn heading(s_(kPsi));
   Vec2 forward_N;
   for (int i = 0; i < Mip::kWheels; ++i) {
     const double side = i == 0 ? 0.5 * robot_.d : -0.5 * robot_.d;
     Ground& ground = ground_[static_cast<std::size_t>(i)];
-    ground.begin_step(s().segment<2>(kPosition) + heading(Vec2(side, 0.0)),
-                      heading(Vec2(0.0, speed + side * s()(kPsiDot))), h);
+    ground.begin_step(s_.segment<2>(kPosition) + heading(Vec2(side, 0.0)),
+                      heading(Vec2(0.0, speed(s_) + side * s_(kPsiDot))), h);
     forward_N(i) = -0.5 * weight_kg() * heading.back(ground.pull_W_m_s2()).y();
   }
   ground_N_ = Vec2(forward_N.sum(), forward_N(0) - forward_N(1));
@@ -134,85 +154,75 @@ void MipWorld::feel_ground(double h) noexcept {
 
 void MipWorld::disturb() {
   if (world_.process_noise_sigma.isZero(0.0)) return;
-  for (int i = 0; i < 6; ++i) now_.state[i] += process_noise_.gaussian(world_.process_noise_sigma(i));
+  for (int i = 0; i < 6; ++i) s_(i) += process_noise_.gaussian(world_.process_noise_sigma(i));
 }
 
 Felt MipWorld::felt(const Vec3& accelerations) const noexcept {
-  const double sin = std::sin(s()(kTheta));
-  const double cos = std::cos(s()(kTheta));
+  const double sin = std::sin(s_(kTheta));
+  const double cos = std::cos(s_(kTheta));
   Felt felt;
   felt.time_s = time_s_;
-  felt.omega_B_rad_s << s()(kThetaDot), sin * s()(kPsiDot), cos * s()(kPsiDot);
+  felt.omega_B_rad_s << s_(kThetaDot), sin * s_(kPsiDot), cos * s_(kPsiDot);
   if (held_ || lifted()) {
     felt.specific_force_B_m_s2 << 0.0, sin * kGravity_m_s2, cos * kGravity_m_s2;
   } else {
     const Vec3 from_com = robot_.l_a - Vec3(0.0, 0.0, robot_.l);
     felt.specific_force_B_m_s2 = -dynamics_.accelerometer_B(
-        {s()(kTheta), s()(kThetaDot), s()(kPhiDot), s()(kPsiDot)}, accelerations, from_com);
+        {s_(kTheta), s_(kThetaDot), s_(kPhiDot), s_(kPsiDot)}, accelerations, from_com);
   }
   const double lift = 0.5 * (ground_[0].lift_m_s2() + ground_[1].lift_m_s2());
   felt.specific_force_B_m_s2 += lift * Vec3(0.0, sin, cos);
   felt.wheel_angle_rad.head<2>() =
-      kinematics_.wheels(s()(kPhi), s()(kPsi)) + Vec2(now_.gears[0].ahead_rad(), now_.gears[1].ahead_rad());
+      kinematics_.wheels(s_(kPhi), s_(kPsi)) + Vec2(gears_[0].ahead_rad(), gears_[1].ahead_rad());
   return felt;
 }
 
+/// A step or, where the PWM changes within it, a part of one: friction is that of the whole.
 void MipWorld::step(double h) noexcept {
   if (lifted()) {
-    now_.state[kThetaDot] = now_.state[kTheta] < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
-    now_.state[kPsiDot] = 0.0;
+    s_(kThetaDot) = s_(kTheta) < kHeldTilt_rad ? kHandRate_rad_s : 0.0;
+    s_(kPsiDot) = 0.0;
   }
   if (uneven_) feel_ground(h);
-  equipoise::step(
-      &now_, Body{*this}, Facing(s()), common_.step_s, h,
-      [this](const Vec2& rates) { return motors_.torque(rates); },
-      [this](const Vec2& rates) { return friction_limit(rates); },
-      [this](const Vec3& accelerations) {
-        if (sensors_.aged()) sensors_.feel(felt(accelerations));
-      });
+  const Facing here = facing(s_);
+  const Vec2 rates = wheel_rates(s_);
+  const Vec2 crossing = motors_.torque(rates + Vec2(gears_[0].rate_rad_s(), gears_[1].rate_rad_s()));
+  for (std::size_t i = 0; i < gears_.size(); ++i)  // the motor's side of each gear
+    engaged_(static_cast<int>(i)) =
+        gears_[i].step(world_.drivetrain.gear, crossing(static_cast<int>(i)), h) ? 1.0 : 0.0;
+  const Vec2 gear = gear_torque(rates);
+  const Vec2 friction = friction_torque(here, gear);
+  const Vec3 now = accelerations(s_, here, gear + friction);
+  if (sensors_.aged()) sensors_.feel(felt(now));
+  s_ = rk4_step(s_, derivative(s_, here, now), h, [&](const State& s) {
+    const Facing then{here.tilt.near(s(kTheta), s(kTheta) - s_(kTheta)),
+                      here.heading.near(s(kPsi), s(kPsi) - s_(kPsi))};
+    return derivative(s, then, accelerations(s, then, gear_torque(wheel_rates(s)) + friction));
+  });
   time_s_ += h;
 }
 
 void MipWorld::end_tick() noexcept {
   if (!held_) disturb();
-  motors_.update_battery(now_.wheel_rates(s()));
-}
-
-bool MipWorld::begin_rolling(const MotorCommand& command, Rolling* robot) noexcept {
-  if (!plain_ || !command.enable) return false;
-  held_ = false;
-  motors_.command(command);
-  *robot = now_;
-  robot->bridges = *motors_.bridges();
-  return true;
-}
-
-void MipWorld::end_rolling(const Rolling& robot) noexcept {
-  now_ = robot;
-  for (int i = 0; i < steps_per_tick(); ++i) time_s_ += common_.step_s;
-  end_tick();
+  motors_.update_battery(wheel_rates(s_));
 }
 
 RawSample MipWorld::sense() {
-  const State at = s();
-  const Vec2 rates = now_.wheel_rates(at);
-  const Vec2 gear = now_.gear_torque(rates, motors_.torque(rates));
-  const Facing facing(at);
-  const Vec2 friction =
-      friction_torque<double>(now_, Body{*this}, at, facing, gear, friction_limit(rates), common_.step_s);
-  return sensors_.sense({felt(accelerations(at, facing, gear + friction)), Vec3(s()(kTheta), 0.0, s()(kPsi)),
-                         motors_.battery_V()});
+  const Facing here = facing(s_);
+  const Vec2 gear = gear_torque(wheel_rates(s_));
+  const Vec3 now = accelerations(s_, here, gear + friction_torque(here, gear));
+  return sensors_.sense({felt(now), Vec3(s_(kTheta), 0.0, s_(kPsi)), motors_.battery_V()});
 }
 
 MipEstimate MipWorld::truth() const noexcept {
   MipEstimate x;
-  x.theta = s()(kTheta);
-  x.phi = s()(kPhi);
-  x.psi = s()(kPsi);
-  x.theta_dot = s()(kThetaDot);
-  x.phi_dot = s()(kPhiDot);
-  x.psi_dot = s()(kPsiDot);
-  x.position_W_m = s().segment<2>(kPosition);
+  x.theta = s_(kTheta);
+  x.phi = s_(kPhi);
+  x.psi = s_(kPsi);
+  x.theta_dot = s_(kThetaDot);
+  x.phi_dot = s_(kPhiDot);
+  x.psi_dot = s_(kPsiDot);
+  x.position_W_m = s_.segment<2>(kPosition);
   return x;
 }
 

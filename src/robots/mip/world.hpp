@@ -8,8 +8,9 @@
 #include <array>
 
 #include "equipoise/plant/engine.hpp"
+#include "equipoise/plant/gear_play.hpp"
 #include "equipoise/plant/ticked_world.hpp"
-#include "robots/mip/rolling.hpp"
+#include "robots/mip/dynamics.hpp"
 
 namespace equipoise {
 
@@ -35,15 +36,8 @@ Mat<2, 2> wheel_mobility(const MipParameters& robot) noexcept;
 
 class MipWorld : public TickedWorld<Mip::kWheels> {
  public:
-  using Rolling = MipRollingOf<double>;
-
   MipWorld(const MipParameters& robot, const MotorParameters& motor, const Calibration& calibration,
            const MipWorldParams& world);
-
-  /// The same tick in two halves, where nothing is on that MipRollingOf leaves out: what the steps depend on,
-  /// if so; and their end. Between them roll() or roll_together().
-  bool begin_rolling(const MotorCommand& command, Rolling* robot) noexcept;
-  void end_rolling(const Rolling& robot) noexcept;
 
   RawSample sense() override;
   void without_attitude() noexcept { sensors_.without_attitude(); }
@@ -52,22 +46,18 @@ class MipWorld : public TickedWorld<Mip::kWheels> {
   const MipParameters& robot() const noexcept { return robot_; }  // as built
 
  private:
-  using State = MipStateOf<double>;
-  using Facing = MipFacingOf<double>;
-  /// With what pushes and pulls the robot, or lifts it.
-  struct Body {
-    const MipWorld& world;
-
-    Vec3 accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept {
-      return world.accelerations(s, facing, wheel_torque);
-    }
-    double speed(const State& s) const noexcept {
-      return world.lifted() ? 0.0 : -world.robot_.r * (s(mip_at::kPhiDot) + s(mip_at::kThetaDot));
-    }
+  using State = Vec<8>;  // theta, phi, psi, their rates, position in W
+  /// Sines and cosines of a state, computed once per evaluation.
+  struct Facing {
+    Turn tilt, heading;
   };
-  Eigen::Map<const State> s() const noexcept { return Eigen::Map<const State>(now_.state); }
+  static Facing facing(const State& s) noexcept;
+  Vec2 wheel_rates(const State& s) const noexcept;
+  double speed(const State& s) const noexcept;  // of the axle along the yaw frame's y axis, m/s
+  Vec2 gear_torque(const Vec2& wheel_rates) const noexcept;
+  Vec2 friction_torque(const Facing& facing, const Vec2& gear_torque) const noexcept;
   Vec3 accelerations(const State& s, const Facing& facing, const Vec2& wheel_torque) const noexcept;
-  Vec2 friction_limit(const Vec2& wheel_rates) const noexcept;
+  State derivative(const State& s, const Facing& facing, const Vec3& accelerations) const noexcept;
   void feel_ground(double h) noexcept;
   double weight_kg() const noexcept { return robot_.m_b + 2.0 * robot_.m_w; }
   Felt felt(const Vec3& accelerations) const noexcept;
@@ -82,10 +72,12 @@ class MipWorld : public TickedWorld<Mip::kWheels> {
   MipDynamics dynamics_;
   std::array<Ground, Mip::kWheels> ground_;  // at +x and at -x of the axle
   Vec2 ground_N_ = Vec2::Zero();  // forward force of both over this step, and of the first less the other
-  MipRollingOf<double> now_;
+  Mat<2, 2> mobility_;
+  State s_;
+  std::array<GearPlay, Mip::kWheels> gears_;
+  Vec2 engaged_ = Vec2::Ones();  // 1: teeth in contact
   SimulatedSensors sensors_;
   bool uneven_;
-  bool plain_;  // as MipRollingOf has it
 };
 
 /// In another engine: our motors, gears, friction and sensors, its rigid bodies and tyres. The engine's

@@ -77,25 +77,6 @@ TEST(Workers, AreWaitedForHoweverLongTheyTake) {
   }
 }
 
-TEST(Workers, BeginWhileTheCallerIsAwayAndAreFinishedByAnyOtherCall) {
-  Workers workers(2);
-  std::atomic<int> sum{0};
-  const std::function<void(int)> add = [&](int i) { sum += i; };
-  for (int round = 1; round <= 200; ++round) {
-    workers.start(1, add);
-    workers.start(5, add);
-    workers.each(0, [](int) {});
-    ASSERT_EQ(sum, 10 * round);
-  }
-  workers.start(5, add);
-  while (sum < 2010) std::this_thread::yield();  // without the caller
-  workers.finish();
-  EXPECT_EQ(sum, 2010);
-  const std::function<void(int)> fails = [](int) { throw std::runtime_error("any"); };
-  workers.start(3, fails);
-  EXPECT_THROW(workers.finish(), std::runtime_error);
-}
-
 TEST(Workers, OneThreadIsTheCallers) {
   Workers alone(1);
   const auto here = std::this_thread::get_id();

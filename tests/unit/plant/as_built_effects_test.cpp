@@ -108,7 +108,6 @@ TEST(Friction, ChangesFromItsStartToItsEnd) {
   p.friction_time_s = 20.0;
   EXPECT_DOUBLE_EQ(p.friction_now(0.0), 0.7);
   EXPECT_NEAR(p.friction_now(20.0), 2.0 - 1.3 * std::exp(-1.0), 1e-12);
-  EXPECT_FALSE(p.plain());
   // What holds wheels at twice the friction lets them go at once.
   const MbbrParameters robot;
   MotorParameters brake;
