@@ -10,8 +10,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "gpio_internal.h"
 #include "monotonic.h"
+#include "sysfs.h"
 
 static bool has_label(const char* path, const char* label) {
   struct gpiochip_info info;
@@ -24,7 +24,8 @@ static bool has_label(const char* path, const char* label) {
   return found;
 }
 
-int gpio_find_chip(const char* chip, char path[SYSFS_PATH_MAX]) {
+/* /dev/gpiochipN of a label or device address. -ENODEV: none. */
+static int find_chip(const char* chip, char path[SYSFS_PATH_MAX]) {
   char dir[SYSFS_PATH_MAX];
   if (sysfs_find("/sys/bus/gpio/devices", "gpiochip", chip, dir) == 0) {
     return sysfs_join(path, "/dev", strrchr(dir, '/') + 1);
@@ -40,7 +41,73 @@ int gpio_find_chip(const char* chip, char path[SYSFS_PATH_MAX]) {
   return status;
 }
 
-bool gpio_is_open(const gpio_line_t* line) { return line->request != NULL; }
+/* `flags` of GPIO_V2_LINE_FLAG_...; `active`: at first, of an output. */
+static int request(gpio_line_t* line, const gpio_pin_t* pin, uint64_t flags, bool active) {
+  line->open = false;
+  line->fd = -1;
+  char path[SYSFS_PATH_MAX];
+  int status = find_chip(pin->chip, path);
+  if (status < 0) return status;
+  const int chip = open(path, O_RDWR | O_CLOEXEC);
+  if (chip < 0) return -errno;
+  struct gpio_v2_line_request asked;
+  memset(&asked, 0, sizeof asked);
+  asked.offsets[0] = pin->offset;
+  asked.num_lines = 1;
+  strcpy(asked.consumer, "equipoise");
+  asked.config.flags = flags;
+  if ((flags & GPIO_V2_LINE_FLAG_OUTPUT) != 0) {
+    asked.config.num_attrs = 1;
+    asked.config.attrs[0].attr.id = GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES;
+    asked.config.attrs[0].attr.values = active;
+    asked.config.attrs[0].mask = 1;
+  }
+  status = ioctl(chip, GPIO_V2_GET_LINE_IOCTL, &asked) < 0 ? -errno : 0;
+  close(chip);
+  if (status < 0) return status;
+  line->open = true;
+  line->fd = asked.fd;
+  return 0;
+}
+
+static uint64_t polarity(const gpio_pin_t* pin) { return pin->active_low ? GPIO_V2_LINE_FLAG_ACTIVE_LOW : 0; }
+
+int gpio_open_output(gpio_line_t* line, const gpio_pin_t* pin, bool active) {
+  return request(line, pin, GPIO_V2_LINE_FLAG_OUTPUT | polarity(pin), active);
+}
+
+int gpio_open_input(gpio_line_t* line, const gpio_pin_t* pin) {
+  return request(line, pin, GPIO_V2_LINE_FLAG_INPUT | polarity(pin), false);
+}
+
+int gpio_open_edge(gpio_line_t* line, const gpio_pin_t* pin, enum gpio_edge edge) {
+  const uint64_t which =
+      edge == GPIO_FALLING ? GPIO_V2_LINE_FLAG_EDGE_FALLING : GPIO_V2_LINE_FLAG_EDGE_RISING;
+  return request(line, pin, GPIO_V2_LINE_FLAG_INPUT | which, false);
+}
+
+bool gpio_is_open(const gpio_line_t* line) { return line->open; }
+
+int gpio_set(gpio_line_t* line, bool active) {
+  struct gpio_v2_line_values values = {.bits = active, .mask = 1};
+  return ioctl(line->fd, GPIO_V2_LINE_SET_VALUES_IOCTL, &values) < 0 ? -errno : 0;
+}
+
+int gpio_get(const gpio_line_t* line) {
+  struct gpio_v2_line_values values = {.bits = 0, .mask = 1};
+  if (ioctl(line->fd, GPIO_V2_LINE_GET_VALUES_IOCTL, &values) < 0) return -errno;
+  return (values.bits & 1) != 0;
+}
+
+/* Newest of all queued edges: count, or -errno. Does not block where poll() has told of one. */
+static int read_edges(const gpio_line_t* line, int64_t* edge_ns) {
+  struct gpio_v2_line_event events[16]; /* the kernel queues as many */
+  const ssize_t size = read(line->fd, events, sizeof events);
+  if (size < 0) return -errno;
+  const int count = (int)((size_t)size / sizeof events[0]);
+  if (count > 0) *edge_ns = (int64_t)events[count - 1].timestamp_ns;
+  return count;
+}
 
 int gpio_wait_edge(gpio_line_t* line, int64_t deadline_ns, int64_t* edge_ns) {
   for (;;) {
@@ -56,11 +123,12 @@ int gpio_wait_edge(gpio_line_t* line, int64_t deadline_ns, int64_t* edge_ns) {
       return errno == EINTR ? 0 : -errno;
     }
     if ((poll_fd.revents & POLLIN) == 0) return -ENODEV;
-    const int count = gpio_read_edges(line, edge_ns);
-    if (count <= 0) return count;
-    /* Kernels before 5.7 stamp edges with CLOCK_REALTIME: then the wake-up is the best time there is. */
-    const int64_t now_ns = monotonic_ns();
-    if (*edge_ns > now_ns || now_ns - *edge_ns > 1000000000) *edge_ns = now_ns;
-    return count;
+    return read_edges(line, edge_ns);
   }
+}
+
+void gpio_close(gpio_line_t* line) {
+  if (line->open) close(line->fd); /* releases the line */
+  line->open = false;
+  line->fd = -1;
 }

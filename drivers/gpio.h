@@ -1,4 +1,4 @@
-/* gpio.h: single lines through libgpiod, one interface over its versions 1 (Debian 12) and 2 (Debian 13).
+/* gpio.h: single lines through the kernel's GPIO character device, version 2 (Linux 5.10).
  * In: the chip's label or device address ("44e07000", never its number: it changes with the kernel) and the
  * line. Out: levels, edges with their CLOCK_MONOTONIC time; 0 or -errno (-EBUSY: someone else holds the
  * line). get, set and wait_edge are real-time safe; wait_edge always returns by its deadline. */
@@ -19,11 +19,8 @@ typedef struct gpio_pin {
 } gpio_pin_t;
 
 typedef struct gpio_line {
-  void* chip;    /* struct gpiod_chip */
-  void* request; /* version 1: struct gpiod_line; version 2: struct gpiod_line_request */
-  void* events;  /* version 2: struct gpiod_edge_event_buffer */
-  unsigned offset;
-  int fd; /* edge lines only */
+  bool open; /* all zero: no line */
+  int fd;
 } gpio_line_t;
 
 enum gpio_edge { GPIO_FALLING, GPIO_RISING };

@@ -4,6 +4,8 @@
 #include <gpio.h>
 #include <time.h>
 
+#include <vector>
+
 #include "syscall_journal.hpp"
 
 FakeGpio& FakeGpio::instance() {
@@ -26,6 +28,7 @@ int FakeGpio::heldLines() const {
 
 namespace {
 using Entry = std::pair<const FakeGpio::Key, FakeGpio::Line>;
+std::vector<const Entry*> handed_out;  // by descriptor
 
 int request(gpio_line_t* line, const gpio_pin_t* pin, bool output, bool active) {
   *line = gpio_line_t{};
@@ -38,12 +41,15 @@ int request(gpio_line_t* line, const gpio_pin_t* pin, bool output, bool active) 
   fake.output = output;
   fake.active_low = pin->active_low;
   if (output) fake.active = active;
-  const auto& entry = *gpio.lines().find({pin->chip, pin->offset});
-  line->request = const_cast<Entry*>(&entry);  // map nodes stay where they are
+  line->open = true;
+  line->fd = static_cast<int>(handed_out.size());
+  handed_out.push_back(&*gpio.lines().find({pin->chip, pin->offset}));  // map nodes stay where they are
   return 0;
 }
 
-Entry& entryOf(const gpio_line_t* line) { return *static_cast<Entry*>(line->request); }
+Entry& entryOf(const gpio_line_t* line) {
+  return const_cast<Entry&>(*handed_out.at(static_cast<std::size_t>(line->fd)));
+}
 }  // namespace
 
 extern "C" {
@@ -58,7 +64,7 @@ int gpio_open_edge(gpio_line_t* line, const gpio_pin_t* pin, enum gpio_edge edge
   return request(line, pin, false, false);
 }
 
-bool gpio_is_open(const gpio_line_t* line) { return line->request != nullptr; }
+bool gpio_is_open(const gpio_line_t* line) { return line->open; }
 
 int gpio_set(gpio_line_t* line, bool active) {
   Entry& entry = entryOf(line);
@@ -92,7 +98,7 @@ int gpio_wait_edge(gpio_line_t*, int64_t deadline_ns, int64_t* edge_ns) {
 }
 
 void gpio_close(gpio_line_t* line) {
-  if (line->request != nullptr) entryOf(line).second.held = false;
+  if (line->open) entryOf(line).second.held = false;
   *line = gpio_line_t{};
   line->fd = -1;
 }

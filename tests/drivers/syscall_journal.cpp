@@ -107,7 +107,7 @@ int __wrap_open64(const char* path, int flags, ...) {
     fd = STDIN_FILENO;
   }
   if (fd == STDIN_FILENO) zero_is_node = is_node;
-  if (fd >= 0) journal.opened(fd);
+  if (fd >= 0) journal.opened(fd, path);
   if (fd >= 0 && (flags & O_CLOEXEC) == 0) journal.openedInheritable();
   errno = error;
   return fd;

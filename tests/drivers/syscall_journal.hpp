@@ -4,7 +4,7 @@
 #pragma once
 
 #include <functional>
-#include <set>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -33,7 +33,8 @@ class SyscallJournal {
 
   // For the wrappers.
   bool isOpen(int fd) const { return open_.count(fd) != 0; }
-  void opened(int fd) { open_.insert(fd); }
+  void opened(int fd, const std::string& path = "") { open_[fd] = path; }
+  std::string pathOf(int fd) const { return open_.at(fd); }  // as it was asked for
   void openedInheritable() { ++inheritable_; }
   void closed(int fd) { stray_closes_ += open_.erase(fd) == 0 ? 1 : 0; }
 
@@ -52,7 +53,7 @@ class SyscallJournal {
   std::vector<std::string> lines_;
   std::vector<Failure> failures_;
   std::vector<std::pair<std::string, std::function<void()>>> answers_;  // by the path's end
-  std::set<int> open_;
+  std::map<int, std::string> open_;
   int stray_closes_ = 0;
   int inheritable_ = 0;
 };

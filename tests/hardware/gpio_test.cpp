@@ -1,4 +1,4 @@
-// Real lines of real (simulated) gpio chips through libgpiod.
+// Real lines of real (simulated) gpio chips through the kernel's character device.
 #include <errno.h>
 #include <gpio.h>
 #include <gtest/gtest.h>

@@ -27,7 +27,7 @@ OS_HEADERS = re.compile(
     r"thread|mutex|shared_mutex|condition_variable|future|iostream|ostream|istream|fstream|sstream|iomanip"
     r"|filesystem|chrono|csignal|ctime|cstdio|cstdlib|clocale|locale|regex"
 )
-LIBRARIES_OUTSIDE_CORE = re.compile(r"lcm/.*|toml.*|CLI/.*|nlohmann/.*|sodium.*|gpiod.*|equipoise/\w+_t\.hpp")
+LIBRARIES_OUTSIDE_CORE = re.compile(r"lcm/.*|toml.*|CLI/.*|nlohmann/.*|sodium.*|equipoise/\w+_t\.hpp")
 C_HEADERS_IN_CORE = ("math.h", "stdbool.h", "stdint.h", "stddef.h", "float.h", "arm_neon.h", "xmmintrin.h")
 
 _MODULE = re.compile(r"src/app/(\w+)/")

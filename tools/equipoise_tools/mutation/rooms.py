@@ -149,9 +149,9 @@ ROOMS: dict[str, Room] = {
         ("drivers/*.c",),
         (
             Stage(
-                "tests/drivers/libgpiod_tests",
-                ("drivers/libgpiod_test.cpp", "drivers/gpio_v1_test.cpp", *DRIVER_FIXTURES),
-                only=("drivers/gpio*.c",),
+                "tests/drivers/gpio_tests",
+                ("drivers/gpio_test.cpp", *DRIVER_FIXTURES),
+                only=("drivers/gpio.c",),
             ),
             *(
                 Stage(DRIVER_BINARY, (f"drivers/{test}_test.cpp", *DRIVER_OWN), only=(f"drivers/{name}.c",))
