@@ -86,7 +86,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
   }
 
   /// The model runs on through missed ticks. The bridges held the last command until the guard let go, if it
-  /// did; then the motors coasted. A stall that safety will not ride through is not worth the time.
+  /// did; then the motors coasted. A stall that safety will not tolerate is not worth the time.
   void bridge_gap(const typename Robot::Sample& z, std::uint32_t inhibit) noexcept {
     const bool overrun = (inhibit & kOverrun) != 0;
     if (held_ || (overrun && (z.ticks > p_.safety.max_stalled_ticks || !health_.predicts_wheels))) return;

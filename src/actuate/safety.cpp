@@ -7,7 +7,7 @@ namespace equipoise {
 namespace {
 
 constexpr int kBatteryTicks = 100;         // half a second below the limit
-constexpr int kCutoffTicks = 5;            // rides through one conversion's spike
+constexpr int kCutoffTicks = 5;            // tolerates one conversion's spike
 constexpr int kBatteryUnknownTicks = 400;  // two seconds without a valid conversion
 constexpr int kBridgeTicks = 3;   // the driver has weighed the evidence; one bad read more decides nothing
 constexpr int kStallEvery = 200;  // ticks; a loop that is late more often is broken
@@ -98,7 +98,7 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
 }
 
 /// A stall that the estimator's model has bridged, and no other of late.
-bool Safety::rides_through(const SafetyInputs& in) noexcept {
+bool Safety::tolerates(const SafetyInputs& in) noexcept {
   const bool late = (in.inhibit & kOverrun) != 0;
   const bool rare = since_stall_ > kStallEvery;
   since_stall_ = late ? 0 : count(since_stall_, false);
@@ -137,7 +137,7 @@ MotorCommand Safety::gate(const MotorCommand& wanted, const SafetyInputs& in) no
   reasons_ = check_sensors(in) | check_motion(in) | check_drive(wanted, in) | in.inhibit;
   if (!in.all_finite || !finite_and_bounded(wanted)) reasons_ |= kNotFinite;
   if (!armed() && !(in.command_age_s <= p_.command_timeout_s)) reasons_ |= kCommandStale;
-  const bool let_go = rides_through(in);
+  const bool let_go = tolerates(in);
   const bool well = (reasons_ & ~(let_go ? kOverrun : 0U)) == 0;
   if (!in.arm_requested) reasons_ |= kNotRequested;
   transition(in.arm_requested, well);

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from equipoise_tools.lint import analyzers, formatting, house, law, tidy
+from equipoise_tools.lint import analyzers, formatting, house, law, tidy, words
 from equipoise_tools.lint.tree import Tree, tree_of_folder, tree_of_git
 
 
@@ -217,6 +217,19 @@ def test_house_allows_ordinary_text(tmp_path):
     assert not house.forbidden_words(
         planted(tmp_path, a_md="the network/work of a root/child, ${x}/workspace")
     )
+
+
+def test_words_finds_old_terms_in_pages_comments_and_identifiers(tmp_path):
+    tree = planted(
+        tmp_path,
+        docs__a_md="line\nafter a flight\n",
+        src__a_cpp="int x;\n// of a flight\n",
+        include__a_hpp="void beginFlight();\nint flight_s;\n",
+        drivers__a_c='/* a run */ char key[] = "flights";\n',
+        src__generated__a_cpp="// of a flight\n",
+    )
+    found = {(f.path, f.line) for f in words.words(tree)}
+    assert found == {("docs/a.md", 2), ("src/a.cpp", 2), ("include/a.hpp", 1), ("include/a.hpp", 2)}
 
 
 def test_house_wants_headers_to_open_with_a_short_comment(tmp_path):

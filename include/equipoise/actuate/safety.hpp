@@ -112,7 +112,7 @@ class Safety {
  private:
   std::uint32_t check_sensors(const SafetyInputs& in) noexcept;
   std::uint32_t check_motion(const SafetyInputs& in) noexcept;
-  bool rides_through(const SafetyInputs& in) noexcept;
+  bool tolerates(const SafetyInputs& in) noexcept;
   std::uint32_t check_drive(const MotorCommand& wanted, const SafetyInputs& in) noexcept;
   void transition(bool requested, bool well) noexcept;
 

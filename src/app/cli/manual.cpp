@@ -110,7 +110,7 @@ std::string manual_page(const Command& c, const std::string& version) {
   if (!c.example.empty()) out << ".SH EXAMPLE\n.nf\n" << roff(c.example) << "\n.fi\n";
   out << ".SH EXIT STATUS\n0 success, 1 a job that failed, 2 bad usage or input.\n";
   if (c.name.empty()) {
-    out << ".SH FILES\n.TP\n.I /etc/default/equipoise\nWhat the service flies.\n"
+    out << ".SH FILES\n.TP\n.I /etc/default/equipoise\nWhat the service runs.\n"
            ".TP\n.I /etc/equipoise\nRobot configurations and board files.\n";
   } else {
     out << ".SH SEE ALSO\n.BR equipoise (1)\n";

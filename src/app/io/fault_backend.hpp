@@ -72,7 +72,7 @@ enum class FaultKind : std::size_t { EQUIPOISE_FAULTS(EQUIPOISE_KIND) kCount };
 
 struct FaultInfo {
   const char* name;
-  /// Ticks from the fault until the motors must be off; 0: may be ridden through while the state stays right.
+  /// Ticks from the fault until the motors must be off; 0: may be tolerated while the state stays right.
   int deadline_ticks;
   const char* why;
   bool once = false;  // strikes in its first tick only: what comes after is usable again

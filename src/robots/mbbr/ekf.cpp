@@ -39,7 +39,7 @@ void MbbrEkfModel::predict(const Vec<18>& x, const Vec3& u, Vec<18>& x_next, Mat
   next.segment<3>(kE) += x(kWheelScale) * step;
   F_observable.middleRows<3>(kE) *= scale;
   F_observable.block<3, 3>(kE, kE).setIdentity();
-  // A torque that stands in the room turns backwards in the yaw frame.
+  // A torque that is constant in the world frame turns backwards in the yaw frame.
   const Turn turn = Turn::small(kTickS * x(kThetaDotZ));
   const double c = keep_ * turn.cosine();
   const double s = keep_ * turn.sine();

@@ -1,35 +1,47 @@
-"""One word for one thing: terms that pages do not use, and what to write instead (docs/glossary.md)."""
+"""One word for one thing: terms that pages and the product's code do not use (docs/glossary.md)."""
 
 from __future__ import annotations
 
 import re
 
-from .tree import Finding, Tree
+from .tree import C_SUFFIXES, Finding, Tree
 
-# Pattern of a term, what to write instead.
-TERMS = tuple(
-    (re.compile(rf"(?<![\w-])(?:{term})(?![\w-])", re.I), instead)
-    for term, instead in (
+Terms = tuple[tuple[re.Pattern[str], str], ...]
+
+
+def terms(*pairs: tuple[str, str]) -> Terms:
+    """Pattern of a term, what to write instead."""
+    return tuple((re.compile(rf"(?<![\w-])(?:{term})(?![\w-])", re.I), instead) for term, instead in pairs)
+
+
+_EVERYWHERE = (
+    (r"fly|flies|flew|flown|flying|flights?", "run"),
+    (r"rid(?:e|es|den|ing) through|ride-through", "tolerated"),
+    (r"in the room|room frame", "world frame"),
+    (r"crooked(?:ly)?", "misaligned"),
+    (r"further delay", "delay margin"),
+)
+CODE_TERMS = terms(*_EVERYWHERE)
+TERMS = terms(
+    *_EVERYWHERE,
+    *(
         (r"lie[sd]?|liars?|lying|honest(?:ly)?", "faulty, inconsistent, healthy; resting (of a body)"),
-        (r"fly|flies|flew|flown|flying|flights?", "run"),
-        (r"rid(?:e|es|den|ing) through|ride-through", "tolerated"),
         (r"left out|leav(?:e|es|ing) out|do(?:es|ing)? without", "excluded, omitted"),
         (r"surprises?|surprised|condemn(?:s|ed)?|blame[sd]?", "innovation, likelihood ratio, isolated"),
         (r"witness(?:es|ed)?|hear[sd]?|feels?|felt|spoil(?:s|t)?|obey(?:s|ed|ing)?", "measure, apply"),
         (r"rooms?|house rules?", "module, folder, layout, rules"),
-        (r"in the room|room frame", "world frame"),
         (r"the play|play (?:at|in|of)|play is", "backlash"),
-        (r"crooked(?:ly)?", "misaligned"),
         (r"as printed|printed (?:ekf|kf|filter|gains|form|one|model|planar|sign)", "as published, published"),
-        (r"further delay", "delay margin"),
         (r"lean(?:s|ed|ing)?", "tilt"),
         (r"let(?:s|ting)? go", "disarm, release"),
         (r"wish(?:es|ed)?|culprits?|conversations?|dead m[ae]n|anecdotes?", "request, faulty part, timeout"),
         (r"ohm-meter|low pass(?!es)|pictures a second|not released", "ohmmeter, low-pass, fps, Unreleased"),
         (r"as far as|whoever|slip of the pen|hands off|nobody|somebody", "plain words"),
         (r"MIPs?", "eduMIP"),
-    )
+    ),
 )  # fmt: skip
+PRODUCT = ("src/", "include/", "drivers/")
+JSON_KEYS_KEPT = '"flights"'
 UNREVISED = ("docs/faults.md",)  # is rewritten with the detector
 GENERATED = ("docs/experiments/", "docs/reports/", "docs/parameters.md", "docs/reasons.md")
 _CODE = re.compile(r"```.*?```|`[^`\n]*`|\]\([^)\s]*\)|<!--.*?-->", re.S)
@@ -46,16 +58,27 @@ def without_code(text: str) -> str:
     return _CODE.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
 
 
+def in_words(line: str) -> str:
+    """Of code: its identifiers as words."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", line.replace(JSON_KEYS_KEPT, "").replace("_", " "))
+
+
+def found(name: str, text: str, patterns: Terms) -> list[Finding]:
+    return [
+        Finding(name, number, f"says '{match[0]}'; write: {instead}")
+        for number, line in enumerate(text.splitlines(), 1)
+        for pattern, instead in patterns
+        for match in pattern.finditer(line)
+        if match[0] not in ("mip", "Mip")  # a command's word
+    ]
+
+
 def words(tree: Tree) -> list[Finding]:
     findings = []
     for name in pages(tree):
-        if name in UNREVISED:
-            continue
-        for number, line in enumerate(without_code(tree.text(name)).splitlines(), 1):
-            for pattern, instead in TERMS:
-                findings += [
-                    Finding(name, number, f"says '{match[0]}'; write: {instead}")
-                    for match in pattern.finditer(line)
-                    if match[0] not in ("mip", "Mip")  # a command's word
-                ]
+        if name not in UNREVISED:
+            findings += found(name, without_code(tree.text(name)), TERMS)
+    for name in tree.ending(*C_SUFFIXES):
+        if name.startswith(PRODUCT):
+            findings += found(name, in_words(tree.text(name)), CODE_TERMS)
     return findings
