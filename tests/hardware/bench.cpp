@@ -100,7 +100,8 @@ void Bench::drivePin(const std::string& chip, unsigned line, bool high) {
 
 void Bench::serveImu(const std::string& driver) {
   kernel_imu_ = !driver.empty();
-  writeText(kDebug + "imu_who_am_i", driver == "mpu6500" ? "112" : "113");  // their register maps, WHO_AM_I
+  writeText(kDebug + "imu_who_am_i",
+            driver.find("mpu6500") != std::string::npos ? "112" : "113");  // their register maps, WHO_AM_I
   writeText(kDebug + "imu_driver", driver + "\n");
 }
 

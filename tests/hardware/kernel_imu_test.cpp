@@ -11,6 +11,7 @@ namespace {
 constexpr std::int64_t kWait_ns = 2'000'000'000;
 
 struct Part {
+  const char* driver;
   const char* name;
   int low_pass;
   double accel_step, gyro_step;  // of the chip, in the boundary's counts
@@ -19,7 +20,7 @@ struct Part {
 
 class KernelImu : public ::testing::TestWithParam<Part> {
  protected:
-  KernelImu() { bench_.serveImu(GetParam().name); }
+  KernelImu() { bench_.serveImu(GetParam().driver); }
   ~KernelImu() override {
     iio_imu_close(&imu_);
     bench_.serveImu("");
@@ -46,9 +47,13 @@ class KernelImu : public ::testing::TestWithParam<Part> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Parts, KernelImu,
-                         ::testing::Values(Part{"mpu6500", 2, 0.1, 0.1, 0},
-                                           Part{"lsm6dso", 1, 1.0, 1.15, 25'000}),
-                         [](const auto& part) { return part.param.name; });
+                         ::testing::Values(Part{"mpu6500", "mpu6500", 2, 0.1, 0.1, 0},
+                                           Part{"spi:mpu6500", "mpu6500", 2, 0.1, 0.1, 0},
+                                           Part{"lsm6dso", "lsm6dso", 1, 1.0, 1.15, 25'000}),
+                         [](const auto& part) {
+                           const bool spi = part.param.driver != std::string(part.param.name);
+                           return std::string(part.param.name) + (spi ? "_on_spi" : "");
+                         });
 }  // namespace
 
 TEST_P(KernelImu, CountsAreTheChipsAtTheRangesAskedFor) {

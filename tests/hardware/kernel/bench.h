@@ -21,8 +21,17 @@ int bench_take_fault(struct bench_fault *fault); /* 0 or -errno; with bench_lock
 void bench_fault_files(const char *name, struct dentry *dir, struct bench_fault *fault);
 
 struct i2c_msg;
+struct spi_device;
 void bench_lsm6dso_message(struct i2c_msg *message); /* with bench_lock held; so */
 bool bench_lsm6dso_convert(const u8 *sample);
+
+/* Reads or writes registers from *at on; with bench_lock held, both. */
+void bench_imu_exchange(u8 *at, u8 *bytes, size_t size, bool read);
+int bench_imu_fault(void);
+
+int bench_spi_init(void);
+void bench_spi_exit(void);
+struct spi_device *bench_spi_bind(const char *driver, int irq);
 
 int bench_imu_init(struct dentry *dir);
 void bench_imu_exit(void);

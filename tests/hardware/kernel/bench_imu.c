@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0
 /* MPU-9250 at address 0x68 of /dev/i2c-2: register file, reset, DMP memory, FIFO of 1024 bytes, interrupt.
- * For the kernel's own driver, which imu_driver binds: "mpu6500", "lsm6dso", or "" to let go. */
+ * For the kernel's own driver, which imu_driver binds: "mpu6500", "lsm6dso", "spi:mpu6500", or "" to let go.
+ */
 #include <linux/fs.h>
 #include <linux/i2c.h>
 #include <linux/interrupt.h>
@@ -8,6 +9,7 @@
 #include <linux/irq_sim.h>
 #include <linux/irqdomain.h>
 #include <linux/module.h>
+#include <linux/spi/spi.h>
 #include <linux/uaccess.h>
 
 #include "bench.h"
@@ -39,6 +41,7 @@ static u32 transfers;
 static struct bench_fault fault;
 static struct irq_domain *domain; /* of the chip's interrupt pin */
 static struct i2c_client *client; /* whose driver serves the chip; else /dev/i2c-2 does */
+static struct spi_device *on_spi; /* the same on the other bus */
 
 static void reset(void)
 {
@@ -100,20 +103,33 @@ static u8 load(u8 at)
 	return reg[at & 0x7f];
 }
 
+void bench_imu_exchange(u8 *at, u8 *bytes, size_t size, bool read)
+{
+	size_t i;
+
+	for (i = 0; i < size; i++) {
+		if (read)
+			bytes[i] = load(*at);
+		else
+			store(*at, bytes[i]);
+		if (*at != DATA && *at != FIFO)
+			++*at;
+	}
+}
+
+int bench_imu_fault(void)
+{
+	return bench_take_fault(&fault);
+}
+
 static void one_message(struct i2c_msg *message)
 {
-	int i = 0;
+	bool read = message->flags & I2C_M_RD;
+	int addressed = !read && message->len;
 
-	if (!(message->flags & I2C_M_RD) && message->len)
-		pointer = message->buf[i++];
-	for (; i < message->len; i++) {
-		if (message->flags & I2C_M_RD)
-			message->buf[i] = load(pointer);
-		else
-			store(pointer, message->buf[i]);
-		if (pointer != DATA && pointer != FIFO)
-			pointer++;
-	}
+	if (addressed)
+		pointer = message->buf[0];
+	bench_imu_exchange(&pointer, message->buf + addressed, message->len - addressed, read);
 }
 
 static int transfer(struct i2c_adapter *adapter, struct i2c_msg *messages, int count)
@@ -209,6 +225,14 @@ static ssize_t data_ready_write(struct file *file, const char __user *from, size
 	return size;
 }
 
+static void unbind(void)
+{
+	i2c_unregister_device(client);
+	client = NULL;
+	spi_unregister_device(on_spi);
+	on_spi = NULL;
+}
+
 static ssize_t driver_write(struct file *file, const char __user *from, size_t size, loff_t *at)
 {
 	struct i2c_board_info info = {.addr = ADDRESS, .irq = irq_find_mapping(domain, 0)};
@@ -219,10 +243,13 @@ static ssize_t driver_write(struct file *file, const char __user *from, size_t s
 	if (copy_from_user(name, from, size))
 		return -EFAULT;
 	strscpy(info.type, strim(name), sizeof(info.type));
-	i2c_unregister_device(client);
-	client = NULL;
+	unbind();
 	if (!*info.type)
 		return size;
+	if (!strncmp(info.type, "spi:", 4)) {
+		on_spi = bench_spi_bind(info.type + 4, info.irq);
+		return on_spi ? size : -ENODEV;
+	}
 	if (!strcmp(info.type, "lsm6dso"))
 		info.addr = LSM6DSO;
 	client = i2c_new_client_device(&adapter, &info);
@@ -240,15 +267,19 @@ static struct debugfs_blob_wrapper registers = {.data = reg, .size = sizeof(reg)
 
 int bench_imu_init(struct dentry *dir)
 {
+	int err;
+
 	domain = irq_domain_create_sim(NULL, 1);
 	if (IS_ERR(domain))
 		return PTR_ERR(domain);
-	if (!irq_create_mapping(domain, 0)) {
-		irq_domain_remove_sim(domain);
-		return -ENOMEM;
-	}
+	err = irq_create_mapping(domain, 0) ? 0 : -ENOMEM;
+	if (err)
+		goto no_irq;
 	irq_set_irq_type(irq_find_mapping(domain, 0), IRQ_TYPE_EDGE_RISING);
 	reset();
+	err = bench_spi_init();
+	if (err)
+		goto no_spi;
 	debugfs_create_file("imu_sample", 0200, dir, NULL, &sample_fops);
 	debugfs_create_file("imu_fifo", 0200, dir, NULL, &fifo_fops);
 	debugfs_create_file("imu_data_ready", 0200, dir, NULL, &data_ready_fops);
@@ -257,13 +288,22 @@ int bench_imu_init(struct dentry *dir)
 	debugfs_create_u8("imu_who_am_i", 0644, dir, &who_am_i);
 	debugfs_create_u32("imu_transfers", 0444, dir, &transfers);
 	bench_fault_files("imu", dir, &fault);
-	return i2c_add_numbered_adapter(&adapter);
+	err = i2c_add_numbered_adapter(&adapter);
+	if (!err)
+		return 0;
+	bench_spi_exit();
+no_spi:
+	irq_dispose_mapping(irq_find_mapping(domain, 0));
+no_irq:
+	irq_domain_remove_sim(domain);
+	return err;
 }
 
 void bench_imu_exit(void)
 {
-	i2c_unregister_device(client);
+	unbind();
 	i2c_del_adapter(&adapter);
+	bench_spi_exit();
 	irq_dispose_mapping(irq_find_mapping(domain, 0));
 	irq_domain_remove_sim(domain);
 }

@@ -27,8 +27,9 @@ std::string text_of(const std::string& path) {
 
 // The robot's files with an IMU that the kernel serves, at 200 Hz or the next rate that its driver has.
 void serve_by_kernel(PinRobot* robot) {
+  const std::string name = robot->imu_driver.substr(robot->imu_driver.find(':') + 1);  // without the bus
   int part = 0;
-  while (imu_part(part)->name != robot->imu_driver) ++part;
+  while (imu_part(part)->name != name) ++part;
   int setting = 0;
   for (int i = 1; i <= IMU_LOW_PASS_MAX; ++i) {
     const int rate_hz = imu_low_pass(part, i)->rate_hz;
@@ -36,7 +37,7 @@ void serve_by_kernel(PinRobot* robot) {
   }
   const std::regex ours("\n(bus|address|interrupt|interrupt_active_low|dmp_firmware|low_pass) =[^\n]*");
   const std::string imu =
-      "[imu]\ndriver = \"iio\"\npart = \"" + robot->imu_driver + "\"\nlow_pass = " + std::to_string(setting);
+      "[imu]\ndriver = \"iio\"\npart = \"" + name + "\"\nlow_pass = " + std::to_string(setting);
   const std::string board = std::regex_replace(text_of(robot->board), ours, "");
   robot->board = "/tmp/board.toml";
   std::ofstream(robot->board) << std::regex_replace(board, std::regex("\\[imu\\][^\n]*"), imu);
@@ -66,6 +67,13 @@ PinRobot PinRobot::mbbr_mpu6500() {
   PinRobot robot = mbbr();
   robot.name = "MbbrMpu6500";
   robot.imu_driver = "mpu6500";
+  return robot;
+}
+
+PinRobot PinRobot::mbbr_mpu6500_on_spi() {
+  PinRobot robot = mbbr();
+  robot.name = "MbbrMpu6500OnSpi";
+  robot.imu_driver = "spi:mpu6500";
   return robot;
 }
 

@@ -33,6 +33,7 @@ struct PinRobot {
 
   static PinRobot mbbr();
   static PinRobot mbbr_mpu6500();  // the same with the chip behind inv_mpu6050
+  static PinRobot mbbr_mpu6500_on_spi();
   static PinRobot mbbr_lsm6dso();  // with another chip, behind st_lsm6dsx
   // Pins and polarities of librobotcontrol's motor.c, signs of its rc_balance.
   static PinRobot edumip();

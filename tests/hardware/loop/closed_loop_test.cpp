@@ -176,7 +176,9 @@ INSTANTIATE_TEST_SUITE_P(Robots, EveryBoard,
                          ::testing::Values(PinRobot::mbbr(), PinRobot::edumip(), PinRobot::edumip_blue()),
                          nameOf);
 INSTANTIATE_TEST_SUITE_P(Imus, KernelImu,
-                         ::testing::Values(PinRobot::mbbr_mpu6500(), PinRobot::mbbr_lsm6dso()), nameOf);
+                         ::testing::Values(PinRobot::mbbr_mpu6500(), PinRobot::mbbr_mpu6500_on_spi(),
+                                           PinRobot::mbbr_lsm6dso()),
+                         nameOf);
 INSTANTIATE_TEST_SUITE_P(Imus, EveryImu,
                          ::testing::Values(PinRobot::mbbr(), PinRobot::mbbr_mpu6500(),
                                            PinRobot::mbbr_lsm6dso()),
