@@ -64,8 +64,10 @@ def test_an_hours_rotated_log_is_read_in_500_megabytes(tmp_path):
     )
     first = tmp_path / "run.lcm"
     first.write_bytes(10 * minute.read_bytes())
+    later = tmp_path / "later"  # its events are numbered on
+    later.write_bytes(first.read_bytes()[:4] + (1).to_bytes(8, "big") + first.read_bytes()[12:])
     for part in range(1, 6):
-        (tmp_path / f"run.{part:04d}.lcm").hardlink_to(first)
+        (tmp_path / f"run.{part:04d}.lcm").hardlink_to(later)
     program = """
 import resource, sys
 import equipoise_robot as eq
