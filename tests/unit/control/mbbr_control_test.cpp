@@ -267,6 +267,30 @@ TEST(MbbrScheduledFeedback, CrossGainsGrowWithTheSpinAndMirrorWithItsSign) {
   EXPECT_NEAR(cross(2.0), -cross(-2.0), 1e-12);
 }
 
+/// The conjugate gains when it turns the other way; that of the input before acts on what was fed back.
+TEST(MbbrScheduledFeedback, IsTheComplexGainsTimesTheErrors) {
+  MbbrScheduledFeedbackParams p;
+  p.gains.schedule.rows = 1;
+  p.gains.schedule.row[0] = {8.0, 1.0, 0.5, 0.25, 2.0, -0.5, 1.0, 0.125, 0.5, 0.25};
+  for (const double way : {1.0, -1.0}) {
+    const auto u = [&p, way](Vec2 MbbrReference::*error, const Vec2& value) {
+      MbbrReference ref;
+      ref.yaw_rate = way * 3.0;
+      ref.*error = value;
+      MbbrScheduledFeedback feedback(p);
+      const Vec2 first = feedback.update(ref).head<2>();
+      ref.*error = Vec2::Zero();
+      EXPECT_EQ(feedback.update(ref).head<2>(),
+                Vec2(0.5 * first.x() - way * 0.25 * first.y(), way * 0.25 * first.x() + 0.5 * first.y()));
+      return first;
+    };
+    EXPECT_EQ(u(&MbbrReference::d_theta, {-1.0, 0.0}), Vec2(8.0, way)) << "the estimate leans by 1";
+    EXPECT_EQ(u(&MbbrReference::d_phi, {0.0, -1.0}), Vec2(way * -0.25, 0.5));
+    EXPECT_EQ(u(&MbbrReference::d_rate, {-1.0, 0.0}), Vec2(2.0, way * -0.5));
+    EXPECT_EQ(u(&MbbrReference::d_phi_dot_unfiltered, {-1.0, 0.0}), Vec2(1.0, way * 0.125));
+  }
+}
+
 /// At a constant acceleration of the ball the body holds a lean: both from the linear model.
 TEST(MbbrScheduledFeedback, FeedsForwardWhatAnAccelerationTakes) {
   const MbbrParameters robot;
