@@ -5,6 +5,7 @@ import json
 import struct
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -60,7 +61,8 @@ def told(address, wanted):
         socket.close()
         return info, channels, found
 
-    return asyncio.run(asyncio.wait_for(listen(), PATIENCE_S))
+    with ThreadPoolExecutor(1) as own:  # playwright leaves the main thread with a running loop
+        return own.submit(lambda: asyncio.run(asyncio.wait_for(listen(), PATIENCE_S))).result()
 
 
 def test_the_shipped_layout_shows_it_live(root, bridge):
