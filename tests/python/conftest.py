@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # synthetic.py
+from driven import CONFIGS, equipoise
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -30,6 +32,21 @@ def known_log(tmp_path_factory) -> Path:
     from synthetic import write_log
 
     return write_log(tmp_path_factory.mktemp("log") / "known.lcm")
+
+
+@pytest.fixture(scope="session", params=CONFIGS)
+def robot(request) -> str:
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def log(root, robot, tmp_path_factory) -> Path:
+    """Four seconds of each robot, driving and turning."""
+    path = tmp_path_factory.mktemp("driven") / "run.lcm"
+    config = ["--config", root / f"config/{CONFIGS[robot]}.toml", "--telemetry", "off", "--log", path]
+    ran = equipoise(root, "sim", *config, "--drive-mps", "0.1", "--yaw-hz", "0.2", "--duration-s", "4")
+    assert ran.returncode == 0, ran.stderr
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -11,12 +11,12 @@ import pytest
 pytest.importorskip("equipoise_robot._core", reason="needs python3-dev; tools/test installs it")
 parquet = pytest.importorskip("pyarrow.parquet")
 import pandas  # noqa: E402
+from driven import equipoise  # noqa: E402
 from equipoise_robot import channels as ch  # noqa: E402
 from equipoise_robot import lerobot  # noqa: E402
 from equipoise_robot.errors import UserError  # noqa: E402
 from equipoise_robot.log import Log  # noqa: E402
 
-CONFIGS = {"mbbr": "mbbr", "mip": "edumip"}
 # LeRobot brings torch: too much for tools/requirements-optional.txt. A Python that has it may be named.
 LEROBOT_PYTHON = os.environ.get("EQUIPOISE_LEROBOT_PYTHON", sys.executable)
 LOAD = """
@@ -30,25 +30,6 @@ said |= {"count": [len(data), data.num_episodes, data.fps]}
 said |= {"means": data.meta.stats["action"]["mean"].tolist()}
 print(json.dumps(said))
 """
-
-
-def equipoise(root, *arguments):
-    command = [root / "build/host/equipoise", *arguments]
-    return subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
-
-
-@pytest.fixture(scope="module", params=CONFIGS)
-def robot(request):
-    return request.param
-
-
-@pytest.fixture(scope="module")
-def log(root, robot, tmp_path_factory):
-    path = tmp_path_factory.mktemp("lerobot") / "run.lcm"
-    config = ["--config", root / f"config/{CONFIGS[robot]}.toml", "--telemetry", "off", "--log", path]
-    ran = equipoise(root, "sim", *config, "--drive-mps", "0.1", "--yaw-hz", "0.2", "--duration-s", "4")
-    assert ran.returncode == 0, ran.stderr
-    return path
 
 
 @pytest.fixture(scope="module")

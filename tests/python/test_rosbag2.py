@@ -13,32 +13,12 @@ OPTIONAL = "tools/test installs tools/requirements-optional.txt"
 rosbags = pytest.importorskip("rosbags", reason=OPTIONAL)
 pytest.importorskip("equipoise_robot._core", reason="needs python3-dev; tools/test installs it")
 import mcap.reader  # noqa: E402
+from driven import equipoise  # noqa: E402
 from equipoise_robot import channels as ch  # noqa: E402
 from equipoise_robot.log import Log  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
 
-DRIVE = ["--drive-mps", "0.1", "--yaw-hz", "0.2", "--duration-s", "4"]
-CONFIGS = {"mbbr": "mbbr", "mip": "edumip"}
 FORWARD = {"mbbr": np.eye(3), "mip": np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])}  # docs/symbols.md
-
-
-def equipoise(root, *arguments):
-    command = [root / "build/host/equipoise", *arguments]
-    return subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
-
-
-@pytest.fixture(scope="module", params=CONFIGS)
-def robot(request):
-    return request.param
-
-
-@pytest.fixture(scope="module")
-def log(root, robot, tmp_path_factory):
-    path = tmp_path_factory.mktemp("bag") / "run.lcm"
-    config = root / f"config/{CONFIGS[robot]}.toml"
-    ran = equipoise(root, "sim", "--config", config, "--telemetry", "off", "--log", path, *DRIVE)
-    assert ran.returncode == 0, ran.stderr
-    return path
 
 
 @pytest.fixture(scope="module")
