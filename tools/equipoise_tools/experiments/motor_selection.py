@@ -24,12 +24,15 @@ MASS_KG, COM_M, G = 0.550, 0.100, 9.8
 BALL_RADIUS_M, WHEEL_RADIUS_M = 0.032, 0.0125
 
 
-def margins(ratio: float) -> tuple[float, float]:
-    """(torque left at the region's speed, speed left at its torque), N m and rpm."""
+def identified(ratio: float) -> tuple[float, float]:
+    """Stall torque and no-load speed at the battery's voltage, N m and rpm, behind another gear."""
     k = TORQUE_CONSTANT_12 * ratio / 12
-    stall = k * BATTERY_V / RESISTANCE_OHM
-    no_load_rpm = BATTERY_V / k * 30 / np.pi
-    return stall * (1 - REGION_RPM / no_load_rpm), no_load_rpm * (1 - REGION_N_M / stall)
+    return k * BATTERY_V / RESISTANCE_OHM, BATTERY_V / k * 30 / np.pi
+
+
+def margins(stall_N_m: float, no_load_rpm: float) -> tuple[float, float]:
+    """(torque left at the region's speed, speed left at its torque), N m and rpm."""
+    return stall_N_m * (1 - REGION_RPM / no_load_rpm), no_load_rpm * (1 - REGION_N_M / stall_N_m)
 
 
 def wheel_torque_N_m(lean_rad: float, T_ob: np.ndarray) -> float:
@@ -41,10 +44,10 @@ def wheel_torque_N_m(lean_rad: float, T_ob: np.ndarray) -> float:
 def measure(lab: Lab) -> Data:
     data = Data()
     for ratio in RATIOS:
-        torque, speed = margins(ratio)
+        torque, speed = margins(*identified(ratio))
         data.add(f"{ratio}:1", "torque_at_600_rpm_N_m", torque)
         data.add(f"{ratio}:1", "speed_at_0.06_N_m_rpm", speed)
-    best = max(np.linspace(4, 40, 361), key=lambda ratio: margins(ratio)[0])
+    best = max(np.linspace(4, 40, 361), key=lambda ratio: margins(*identified(ratio))[0])
     data.add("2.3.3", "gear_with_most_torque_at_600_rpm", best)
     data.add("2.3.3", "speed_at_600_rpm_m_s", 600 * np.pi / 30 * WHEEL_RADIUS_M)
     data.add("2.3.3", "four_ball_turns_a_second_m_s", 4 * 2 * np.pi * BALL_RADIUS_M)
@@ -102,8 +105,8 @@ def report(data: Data, out_dir: Path) -> Result:
     with plt.rc_context(style.RC):
         figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
         for i, ratio in enumerate(RATIOS):
-            k = TORQUE_CONSTANT_12 * ratio / 12
-            line = [0, BATTERY_V / k * 30 / np.pi], [k * BATTERY_V / RESISTANCE_OHM, 0]
+            stall, no_load_rpm = identified(ratio)
+            line = [0, no_load_rpm], [stall, 0]
             axes.plot(*line, color=style.colour(i), lw=2 if ratio == 12 else 1, label=f"{ratio}:1")
         axes.add_patch(plt.Rectangle((0, 0), REGION_RPM, REGION_N_M, color=style.REFERENCE, alpha=0.3, lw=0))
         axes.set(xlabel="speed at the wheel, rpm", ylabel="torque, N m", xlim=(0, 2500), ylim=(0, 0.6))
