@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ G = 9.8  # [T] Tables 3.2, 5.2
 HOLDS = 2.0  # friction coefficient of a floor that is said never to let slip
 TYRE_GRIP = 0.8  # rubber on a hard floor; the tyres touch at points and do not scrub
 TYRE_M = 0.016  # width, to look at
+MM = "0.001 0.001 0.001"  # mesh files are in millimetres
 LIGHT_KG, LIGHT_KG_M2 = 1e-6, 1e-10  # of URDF links that only carry a joint: engines refuse 0
 # Body axes in those of base_link, the columns of R_FB. The eduMIP's body has x left, y back.
 R_FB = {"mbbr": np.eye(3), "mip": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])}
@@ -55,13 +56,14 @@ class Floor:
 
 @dataclass(frozen=True)
 class Shape:
-    """To look at; cylinder: radius, length along `axis`; box: three edges; sphere: radius."""
+    """To look at; cylinder: radius, length along `axis`; box: three edges; sphere: radius; mesh: a file."""
 
     kind: str
-    size: Numbers
+    size: Numbers = ()
     at: Numbers = (0.0, 0.0, 0.0)
     axis: Numbers = (0.0, 0.0, 1.0)
     rgba: str = "0.2 0.2 0.2 1"
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,8 @@ def rolling_radius_m(robot: str, d: dict[str, Any]) -> float:
     return float(d["ball_radius_m" if robot == "mbbr" else "wheel_radius_m"])
 
 
-def bodies(robot: str, d: dict[str, Any]) -> list[Body]:
-    """What MuJoCo moves, by _core.dimensions; the first is the robot's body."""
+def bodies(robot: str, d: dict[str, Any], mesh: str = "") -> list[Body]:
+    """What MuJoCo moves, by _core.dimensions; the first is the robot's body, which looks like a mesh file."""
     tall, r = 2.0 * d["com_height_m"], rolling_radius_m(robot, d)
     low = 1.3 * r if robot == "mbbr" else 0.0
     middle = (0.0, 0.0, (low + tall) / 2)
@@ -100,7 +102,8 @@ def bodies(robot: str, d: dict[str, Any]) -> list[Body]:
         "mip": Shape("box", (0.05, 0.03, tall), middle, rgba="0.3 0.4 0.6 0.5"),
     }
     com = (0.0, 0.0, d["com_height_m"])
-    body = Body("robot", d["body_mass_kg"], tuple(d["body_inertia_kg_m2"]), looks[robot], com)
+    look = Shape("mesh", rgba="0.3 0.4 0.6 1", file=mesh) if mesh else looks[robot]
+    body = Body("robot", d["body_mass_kg"], tuple(d["body_inertia_kg_m2"]), look, com)
     if robot == "mbbr":  # the wheels' inertia is the joint's armature
         moments = (d["ball_inertia_kg_m2"],) * 3
         armature = d["wheel_inertia_about_ball_kg_m2"]
@@ -145,8 +148,8 @@ def omniwheels(d: dict[str, Any]) -> list[Body]:
     ]
 
 
-def robot_bodies(robot: str, d: dict[str, Any]) -> list[Body]:
-    return bodies(robot, d) + (omniwheels(d) if robot == "mbbr" else [])
+def robot_bodies(robot: str, d: dict[str, Any], mesh: str = "") -> list[Body]:
+    return bodies(robot, d, mesh) + (omniwheels(d) if robot == "mbbr" else [])
 
 
 def possible(moments: Numbers) -> Numbers:
@@ -162,11 +165,11 @@ def possible(moments: Numbers) -> Numbers:
 
 
 def mjcf_shape(shape: Shape) -> str:
-    sizes = {"cylinder": (1.0, 0.5), "box": (0.5, 0.5, 0.5), "sphere": (1.0,)}[shape.kind]
-    size = numbers(np.multiply(shape.size, sizes))
+    sizes = {"cylinder": (1.0, 0.5), "box": (0.5, 0.5, 0.5), "sphere": (1.0,), "mesh": ()}[shape.kind]
+    size = f'mesh="{shape.file}"' if shape.file else f'size="{numbers(np.multiply(shape.size, sizes))}"'
     turned = f' zaxis="{numbers(shape.axis)}"' if shape.axis != (0.0, 0.0, 1.0) else ""
     return (
-        f'<geom type="{shape.kind}" pos="{numbers(shape.at)}" size="{size}"{turned}\n'
+        f'<geom type="{shape.kind}" pos="{numbers(shape.at)}" {size}{turned}\n'
         f'              contype="0" conaffinity="0" rgba="{shape.rgba}"/>'
     )
 
@@ -191,7 +194,7 @@ def mjcf_body(body: Body, inside: str, contact: str) -> str:
       </body>"""
 
 
-def mjcf(robot: str, d: dict[str, Any], floor: Floor | None = None) -> str:
+def mjcf(robot: str, d: dict[str, Any], floor: Floor | None = None, mesh: str = "") -> str:
     """`inertia_NAME`: exact moments, which mujoco_engine gives to the compiled model.
 
     Without its noslip iterations MuJoCo's contacts creep under load: a ball that should stick spins.
@@ -199,7 +202,7 @@ def mjcf(robot: str, d: dict[str, Any], floor: Floor | None = None) -> str:
     grip = d.get("floor_grip", TYRE_GRIP) or HOLDS
     friction = numbers([grip, grip * d.get("floor_torsion_radius_m", 0.0), 0.0])
     contact = f'friction="{friction}" condim="4" solref="0.002 1"'
-    body, *others = bodies(robot, d)
+    body, *others = bodies(robot, d, mesh)
     inside = f'\n        <site name="imu" pos="{numbers(d["imu_position_m"])}"/>'
     inside += "".join("\n      " + mjcf_body(other, "", contact) for other in others)
     standing = Body(**vars(body) | {"at": (0.0, 0.0, others[0].rolls_m)})
@@ -208,8 +211,9 @@ def mjcf(robot: str, d: dict[str, Any], floor: Floor | None = None) -> str:
         for b in (body, *others)
         if robot == "mip"
     )
+    asset = f'<asset><mesh name="{mesh}" file="{mesh}" scale="{MM}"/></asset>' if mesh else ""
     return f"""<mujoco model="{Path(ROBOTS[robot]).stem}">
-  {f"<custom>{exact}</custom>" if exact else ""}
+  {f"<custom>{exact}</custom>" if exact else ""}{asset}
   <compiler angle="radian"/>
   <option timestep="{d["step_s"]:.9g}" gravity="0 0 -{G}" integrator="implicitfast" cone="elliptic"
           impratio="20" noslip_iterations="3"/>
@@ -236,9 +240,13 @@ def origin(at: Iterable[float], rpy: Iterable[float] = (0.0, 0.0, 0.0)) -> str:
 
 def urdf_link(body: Body) -> str:
     shape = body.shape
-    names = {"cylinder": ("radius", "length"), "box": ("size",), "sphere": ("radius",)}[shape.kind]
+    names = {"cylinder": ("radius", "length"), "box": ("size",), "sphere": ("radius",), "mesh": ()}[
+        shape.kind
+    ]
     sizes: tuple[Any, ...] = (shape.size,) if shape.kind == "box" else shape.size
     geometry = " ".join(f'{name}="{numbers(size)}"' for name, size in zip(names, sizes, strict=True))
+    if shape.file:
+        geometry = f'filename="{shape.file}" scale="{MM}"'
     x, y, z = shape.axis
     turned = (0.0, math.acos(max(-1.0, min(1.0, z))), math.atan2(y, x))
     looks = f"""{origin(shape.at, turned)}
@@ -279,7 +287,7 @@ def fixed_frames(robot: str, d: dict[str, Any]) -> dict[str, tuple[NDArray[np.fl
     }
 
 
-def urdf(robot: str, d: dict[str, Any]) -> str:
+def urdf(robot: str, d: dict[str, Any], mesh: str = "") -> str:
     """The ball's joint is three hinges, for URDF knows no other: near them it turns as it should.
 
     For simulation there is the MJCF: a URDF cannot say that omniwheels turn the ball.
@@ -287,7 +295,7 @@ def urdf(robot: str, d: dict[str, Any]) -> str:
     text = '  <link name="base_link"/>\n  <link name="imu_link"/>\n'
     for name, (at, yaw) in fixed_frames(robot, d).items():
         text += urdf_joint(f"{name}_fixed", "base_link", name, at, rpy=(0.0, 0.0, yaw))
-    for body in robot_bodies(robot, d):
+    for body in robot_bodies(robot, d, mesh):
         text += urdf_link(body)
         if body.joint == "hinge":
             text += urdf_joint(body.name, body.parent, body.name, body.at, numbers(body.axis))
@@ -308,7 +316,7 @@ def dimensions(config: str | Path) -> tuple[str, dict[str, Any]]:
     return _core.robot_type(asked.config), json.loads(_core.dimensions(asked))
 
 
-FORMATS = {"xml": mjcf, "urdf": urdf}
+FORMATS: dict[str, Callable[..., str]] = {"xml": mjcf, "urdf": urdf}
 
 
 def main() -> int:
@@ -318,11 +326,23 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder (default: models)")
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
+    try:
+        from . import body
+    except ModuleNotFoundError as error:
+        meshes = False
+        print(f"note: bodies without meshes: {error}")
+    else:
+        meshes = True
     for name, config in ROBOTS.items():
         robot, d = dimensions(name)
+        stl = ""
+        if meshes:
+            stl = f"{Path(config).stem}.stl"
+            body.mesh(body.looks(body.assemble(name))).export(out / stl)
+            print(out / stl)
         for suffix, write in FORMATS.items():
             path = (out / config).with_suffix(f".{suffix}")
-            path.write_text(write(robot, d))
+            path.write_text(write(robot, d, mesh=stl))
             print(path)
     return 0
 

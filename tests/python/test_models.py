@@ -27,7 +27,7 @@ def configured(root, robot):
 @pytest.mark.parametrize("suffix", models.FORMATS)
 def test_the_committed_model_is_the_configured_robot(root, robot, suffix):
     assert (root / f"models/{STEMS[robot]}.{suffix}").read_text() == models.FORMATS[suffix](
-        *models.dimensions(robot)
+        *models.dimensions(robot), mesh=f"{STEMS[robot]}.stl"
     ), "run build/venv/bin/python -m equipoise_robot.models"
 
 
@@ -49,7 +49,7 @@ def test_ros_own_parser_takes_the_urdf(root, robot):
 
 def urdf(root, robot):
     yourdfpy = pytest.importorskip("yourdfpy", reason=OPTIONAL)
-    loaded = yourdfpy.URDF.load(root / f"models/{STEMS[robot]}.urdf")
+    loaded = yourdfpy.URDF.load(str(root / f"models/{STEMS[robot]}.urdf"))
     assert loaded.validate(), loaded.errors
     return loaded
 
@@ -112,10 +112,39 @@ def test_axes_of_ros_and_of_the_joints(root, robot, configured):
             assert axes[f"ball_about_{axis}"] == pytest.approx(unit, abs=1e-9)
 
 
-def compiled(text):
+def test_the_bodys_mesh_is_seen_and_weighs_nothing(root, robot, configured):
+    shown = urdf(root, robot)
+    shapes = [geometry.extents for geometry in shown.scene.geometry.values()]
+    mesh = trimesh_of(root, robot).extents * 1e-3
+    assert any(extents == pytest.approx(mesh, rel=1e-5) for extents in shapes), shapes
+    assert shown.scene.extents[2] < configured["com_height_m"] * 3  # millimetres would be a thousand times
+    model, _ = compiled(root / f"models/{STEMS[robot]}.xml")
+    assert model.nmesh == 1
+    geom = next(i for i in range(model.ngeom) if model.geom_dataid[i] == 0)
+    assert model.geom_contype[geom] == model.geom_conaffinity[geom] == 0
+    assert model.body_mass[model.body("robot").id] == pytest.approx(configured["body_mass_kg"])
+
+
+def trimesh_of(root, robot):
+    trimesh = pytest.importorskip("trimesh", reason=OPTIONAL)
+    return trimesh.load(root / f"models/{STEMS[robot]}.stl")
+
+
+def test_the_committed_mesh_is_the_configured_body(root, robot):
+    body = pytest.importorskip("equipoise_robot.body", reason=OPTIONAL)
+    made, committed = body.mesh(body.looks(body.assemble(robot))), trimesh_of(root, robot)
+    assert committed.is_watertight
+    for what in ("bounds", "volume", "moment_inertia"):
+        was = getattr(committed, what)
+        assert was == pytest.approx(
+            getattr(made, what), rel=1e-3, abs=1e-5 * np.abs(was).max()
+        ), "run build/venv/bin/python -m equipoise_robot.models"
+
+
+def compiled(path):
     """By MuJoCo, free; it merges what is fixed."""
     mujoco = pytest.importorskip("mujoco", reason=OPTIONAL)
-    spec = mujoco.MjSpec.from_string(text)
+    spec = mujoco.MjSpec.from_file(str(path))
     if not any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in spec.joints):
         spec.compiler.fusestatic = False
         spec.body("base_link").add_freejoint()
@@ -130,8 +159,8 @@ def compiled(text):
 
 def test_mujoco_makes_the_same_robot_of_both(root, robot):
     """Upright: the same mass matrix, in the axes of ROS where it is the URDF's."""
-    of_mjcf, mass = compiled((root / f"models/{STEMS[robot]}.xml").read_text())
-    of_urdf, other = compiled((root / f"models/{STEMS[robot]}.urdf").read_text())
+    of_mjcf, mass = compiled(root / f"models/{STEMS[robot]}.xml")
+    of_urdf, other = compiled(root / f"models/{STEMS[robot]}.urdf")
     if robot == "mbbr":
         joints = [of_urdf.joint(f"ball_about_{axis}").dofadr[0] for axis in "xyz"]
     else:
