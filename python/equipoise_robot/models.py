@@ -23,7 +23,7 @@ from ._data import ROBOTS
 from .simulation import request
 
 G = 9.8  # [T] Tables 3.2, 5.2
-HOLDS = 2.0  # friction coefficient of a floor that is said never to let slip
+HOLDS, HOLDS_RADIUS_M = 2.0, 0.1  # friction of a floor that is said never to let slip, about the vertical too
 TYRE_GRIP = 0.8  # rubber on a hard floor; the tyres touch at points and do not scrub
 TYRE_M = 0.016  # width, to look at
 MM = "0.001 0.001 0.001"  # mesh files are in millimetres
@@ -199,8 +199,10 @@ def mjcf(robot: str, d: dict[str, Any], floor: Floor | None = None, mesh: str = 
 
     Without its noslip iterations MuJoCo's contacts creep under load: a ball that should stick spins.
     """
-    grip = d.get("floor_grip", TYRE_GRIP) or HOLDS
-    friction = numbers([grip, grip * d.get("floor_torsion_radius_m", 0.0), 0.0])
+    grip, radius = d.get("floor_grip", TYRE_GRIP), d.get("floor_torsion_radius_m", 0.0)
+    if not grip:
+        grip, radius = HOLDS, HOLDS_RADIUS_M
+    friction = numbers([grip, grip * radius, 0.0])
     contact = f'friction="{friction}" condim="4" solref="0.002 1"'
     body, *others = bodies(robot, d, mesh)
     inside = f'\n        <site name="imu" pos="{numbers(d["imu_position_m"])}"/>'
