@@ -34,6 +34,20 @@ TEST(GyroBias, IsTheMeanInSensorAxes) {
   EXPECT_NEAR(bias.bias_S_rad_s.y(), -2.0 * kPi / 180.0, 1e-12);
 }
 
+TEST(GyroBias, ItsNoiseIsInTheSameUnit) {
+  EXPECT_NEAR(gyro_bias(at_rest(Vec3::Zero()), Calibration{}).sigma_S_rad_s.z(), 1.4 / 16.4 * kPi / 180.0,
+              1e-12);
+}
+
+TEST(GyroBias, OneCountOfAWheelIsRest) {
+  Stillness still = at_rest(Vec3::Zero());
+  still.encoder_travel[kMaxMotors - 1] = 1.0;
+  EXPECT_EQ(complaint([&] { gyro_bias(still, Calibration{}); }), "accepted");
+  still.encoder_travel[kMaxMotors - 1] = 1.1;
+  EXPECT_THAT(complaint([&] { gyro_bias(still, Calibration{}); }),
+              HasSubstr("wheel " + std::to_string(kMaxMotors) + " turned by 1 counts"));
+}
+
 TEST(GyroBias, RefusesMotionAndSaysHowMuch) {
   Stillness shaken = at_rest(Vec3::Zero());
   shaken.gyro_sigma.y() = 3.0 * 16.4;
@@ -102,10 +116,30 @@ TEST(SixFaces, RefusesWhatNoChipDoes) {
   EXPECT_THAT(complaint([&] { fit_six_faces(faces, faces[1]); }), HasSubstr("implausible fit"));
 }
 
+TEST(SixFaces, TakesWhatAChipHas) {
+  const auto told = [](double scale, double bias) {
+    std::vector<Vec3> faces;
+    for (const Vec3& up : {Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(0, 1, 0), Vec3(0, -1, 0), Vec3(0, 0, 1),
+                           Vec3(0, 0, -1), Vec3(1, 0.1, 0.2)})
+      faces.emplace_back((kGravity_m_s2 * up.normalized() + bias * Vec3::UnitY()) / scale);
+    return complaint([&] { fit_six_faces(faces, faces[0]); });
+  };
+  EXPECT_EQ(told(1.09, 1.9), "accepted");
+  EXPECT_EQ(told(0.91, -1.9), "accepted");
+  EXPECT_THAT(told(1.11, 0.0), HasSubstr("scale off by 11 %"));
+  EXPECT_THAT(told(0.89, 0.0), HasSubstr("scale off by 11 %"));
+  EXPECT_THAT(told(1.0, -2.1), HasSubstr("bias 2.10 m/s2"));
+}
+
 TEST(FaceUp, NeedsAnAxisWithin25Degrees) {
   EXPECT_EQ(face_up({0, 0, 9.8}), 2);
   EXPECT_EQ(face_up({0, -9.8, 3.0}), 4);
   EXPECT_EQ(face_up({7, 0, 7}), -1);
+  const auto tipped = [](double deg) {
+    return face_up({-std::cos(deg * kPi / 180.0), 0.0, std::sin(deg * kPi / 180.0)});
+  };
+  EXPECT_EQ(tipped(24.9), 3);
+  EXPECT_EQ(tipped(25.1), -1);
 }
 
 TEST(MountRotation, ComesFromGravityAtTwoPoses) {
@@ -125,6 +159,20 @@ TEST(MountRotation, RefusesTooLittleTiltAndNoGravity) {
   const Vec3 up(0, 0, kGravity_m_s2);
   EXPECT_THAT(complaint([&] { mount_rotation(up, {0.9, 0, 9.75}, Vec3::UnitY()); }), HasSubstr("5 degrees"));
   EXPECT_THAT(complaint([&] { mount_rotation(1.5 * up, up, Vec3::UnitY()); }), HasSubstr("14.7 m/s2"));
+}
+
+TEST(MountRotation, TakesTiltsOf15To120DegreesAndGravityWithinATenth) {
+  const auto told = [](double deg, double size) {
+    const double a = deg * kPi / 180.0;
+    const Vec3 up(0, 0, size * kGravity_m_s2);
+    return complaint(
+        [&] { mount_rotation(up, Vec3(0, std::sin(a), std::cos(a)) * kGravity_m_s2, Vec3::UnitX()); });
+  };
+  for (const double deg : {15.1, 119.9}) EXPECT_EQ(told(deg, 1.0), "accepted") << deg;
+  EXPECT_THAT(told(14.9, 1.0), HasSubstr("tipped by 15 degrees where 15 to 120"));
+  EXPECT_THAT(told(120.4, 1.0), HasSubstr("tipped by 120 degrees"));
+  for (const double size : {0.91, 1.09}) EXPECT_EQ(told(60.0, size), "accepted") << size;
+  for (const double size : {0.89, 1.11}) EXPECT_THAT(told(60.0, size), HasSubstr("is not gravity")) << size;
 }
 
 }  // namespace

@@ -112,6 +112,17 @@ TEST(NamedPaths, AreAsLargeAsTheReferenceSays) {
   EXPECT_NEAR(farthest, 0.4, 1e-3) << "half its width";
 }
 
+TEST(NamedPaths, BeginSmoothlyWithinTwoSeconds) {
+  for (const char* name : {"circle", "waltz", "square"}) {
+    const auto path = make_path(name, kSpeed_m_s, kAnything);
+    const auto speed = [&](double t_s) { return path->at(t_s).velocity_W_m_s.norm(); };
+    EXPECT_NEAR(speed(0.5), 0.15625 * kSpeed_m_s, 1e-12) << name;  // x^2 (3 - 2x)
+    EXPECT_NEAR(speed(1.0), 0.5 * kSpeed_m_s, 1e-12);
+    EXPECT_NEAR(speed(2.0), kSpeed_m_s, 1e-12);
+    EXPECT_EQ(speed(-1.0), 0.0);
+  }
+}
+
 TEST(WaypointPath, IsTheClampedCubicSpline) {
   // 3 t^2 - 2 t^3 is at rest at 0 and 1: a clamped spline through its points is the cubic itself.
   const auto cubic = [](double t) { return t * t * (3.0 - 2.0 * t); };
@@ -169,9 +180,35 @@ TEST(WaypointPath, ATimeThatNoTickReachesIsRefused) {
   }
 }
 
+TEST(WaypointPath, LinesThatSayNothingAreCountedAndADayIsNotTooLong) {
+  const std::string text = "# a path\r\n\n \t\r\n0 0 0 0 # start\r\n86400 1 0 0\n86400 1 0 0\n";
+  EXPECT_NE(refusal(waypoint_file(text), kAnything).find(":6: times must increase"), std::string::npos);
+}
+
+/// 3 t^2 - 2 t^3: 1.5 m/s in its middle, and 5.97 m/s^2 over its first tick.
+TEST(WaypointPath, WhatTheRobotJustDoesIsAllowed) {
+  const std::string fast = waypoint_file("0 0 0 0\n1 1 0 0\n");
+  EXPECT_EQ(refusal(fast, {1.50001, 5.9701, 10.0}), "");
+  EXPECT_NE(refusal(fast, {1.4999, 5.9701, 10.0}).find("asks for 1.5 m/s at"), std::string::npos);
+  EXPECT_NE(refusal(fast, {1.50001, 5.9699, 10.0}).find("asks for 5.97 m/s^2 at 0.005 s"), std::string::npos);
+  EXPECT_EQ(refusal("waltz", {2.0, 7.0, kPi}), "") << "half a turn per second";
+  EXPECT_NE(refusal("waltz", {2.0, 7.0, 3.14}).find("rad/s of yaw"), std::string::npos);
+  PathLimits nose{2.0, 7.0, 0.33};
+  nose.along_nose = true;
+  EXPECT_NE(refusal("circle", nose).find("rad/s of yaw"), std::string::npos) << "0.1 m/s over 0.3 m";
+  nose.yaw_rate_rad_s = 0.334;
+  EXPECT_EQ(refusal("circle", nose), "");
+}
+
 TEST(WaypointPath, AJumpBetweenTwoTicksIsRefused) {
   const std::string jump = waypoint_file("0 0 0 0\n4.0001 0 0 0\n4.0002 3 0 0\n8 3 0 0\n");
   EXPECT_NE(refusal(jump, kAnything), "");
+  std::string unseen = "0 0 0 0\n";  // at rest again by the next tick
+  for (int i = 0; i < 30; ++i)
+    unseen += std::to_string(4.0005 + 1e-4 * i) + (i < 15 ? " 0 0 0\n" : " 3 0 0\n");
+  EXPECT_NE(
+      refusal(waypoint_file(unseen + "8 3 0 0\n"), kAnything).find("asks for 600 m/s between two ticks"),
+      std::string::npos);
 }
 
 TEST(WaypointPath, ARobotThatGoesAlongItsNoseRefusesCusps) {

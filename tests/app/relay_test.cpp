@@ -5,15 +5,20 @@
 #include <pty.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <exception>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "app/run/conversation.hpp"
+#include "app/text/json.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 #include "equipoise/types.hpp"
 
@@ -40,6 +45,12 @@ TEST(LiveRequest, TakesNothingElse) {
   for (const char* line :
        {"", "ARM", "arm now", "drive", "drive 1", "drive 0 0 0 0", "drive a 0 0", "drive nan 0 0",
         "drive 2.1 0 0", "drive 0 -2.1 0", "drive 0 0 5.1", "drive 1e999 0 0"})
+    EXPECT_FALSE(live_request(line)) << line;
+}
+
+TEST(LiveRequest, TheRangesBelongToIt) {
+  for (const char* line : {"drive 2 2 5", "drive -2 -2 -5"}) EXPECT_TRUE(live_request(line)) << line;
+  for (const char* line : {"drive -2.1 0 0", "drive 0 2.1 0", "drive 0 0 -5.1", "drive 0 inf 0", "take it"})
     EXPECT_FALSE(live_request(line)) << line;
 }
 
@@ -79,18 +90,22 @@ class Relay : public ::testing::Test {
   }
 
   /// Returns when a robot has been found. `requests`: from which lines come.
-  void start(int baud, int requests) {
+  void start(int baud, int requests, double patience_s = kPatience_s) {
     const CommandKeys keys = CommandKeys::of_robot("mbbr", CommandKey({1, 2, 3}));
     robot_ = std::make_unique<CommandReceiver>(
         keys, runtime::CommandReceiverOptions{"", kPatience_s, {}},
         std::make_unique<runtime::StreamWire>(std::make_unique<Terminal>(robots_)));
     arguments_.url = "serial:" + device_ + ":" + std::to_string(baud);
-    arguments_.timeout_s = kPatience_s;
+    arguments_.timeout_s = patience_s;
     thread_ = std::thread([this, keys, requests] {
       Conversation conversation(arguments_, keys);
       conversation.find_robots();
       found_ = true;
-      conversation.relay(requests);
+      try {
+        conversation.relay(requests);
+      } catch (const std::exception& failure) {
+        error_ = failure.what();
+      }
       returned_ = true;
     });
     ASSERT_TRUE(soon([this] { return found_.load(); }));
@@ -167,11 +182,13 @@ class Relay : public ::testing::Test {
   SendArguments arguments_;
   std::unique_ptr<CommandReceiver> robot_;
   std::atomic<bool> found_{false}, returned_{false};
+  std::string error_;  // once it has returned
   std::thread thread_;
   static inline std::atomic<bool> stopped{false}, resumed{false};
 };
 
 constexpr int kQuick = 115200;
+const std::vector<std::string> kLadder{"waiting", "armed", "fault"};
 constexpr int kSlow = 1200;  // a command takes longer than a second: the next one waits
 
 TEST_F(Relay, ArmsDrivesAndDisarmsAndEndsWithItsInput) {
@@ -207,8 +224,55 @@ TEST_F(Relay, ALineWithoutEndEndsIt) {
   say(noise);
   EXPECT_FALSE(soon([&] { return returned_.load(); }, 0.3));
   say(noise);
+  EXPECT_FALSE(soon([&] { return returned_.load(); }, 0.3)) << "this much is read";
   say("x");
   EXPECT_TRUE(soon([&] { return returned_.load(); }));
+}
+
+TEST_F(Relay, ALineThatIsNoRequestIsNamed) {
+  start(kQuick, requests_[0]);
+  say("jump\n");
+  ASSERT_TRUE(soon([&] { return returned_.load(); }));
+  EXPECT_EQ(error_.find("--live: 'jump': expected arm, disarm, "), 0U) << error_;
+}
+
+TEST_F(Relay, ARobotThatFallsSilentIsGone) {
+  start(kQuick, requests_[0], 3.0);
+  EXPECT_FALSE(soon([&] { return returned_.load(); }, 4.0)) << "as long as it speaks: " << error_;
+  robot_.reset();
+  for (int i = 0; i < 4000 && !returned_; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ASSERT_TRUE(returned_);
+  EXPECT_EQ(error_, "mbbr is heard no more");
+}
+
+TEST_F(Relay, SaysWhatTheRobotConfirmsAndEachOnce) {
+  testing::internal::CaptureStdout();
+  start(kQuick, requests_[0]);
+  const auto stays = [&](ArmState state) {
+    for (int i = 0; i < 80; ++i) {
+      (void)robot_->latest();
+      robot_->tell(state);
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  };
+  stays(ArmState::kDisarmed);
+  say("arm\n");
+  ASSERT_TRUE(soon([&] { return robot_->latest().arm; }));
+  stays(ArmState::kDisarmed);
+  stays(ArmState::kArmed);
+  stays(ArmState::kFault);
+  end();
+  std::istringstream lines(testing::internal::GetCapturedStdout());
+  std::vector<std::string> states;
+  std::string before;
+  for (std::string line; std::getline(lines, line); before = line) {
+    EXPECT_NE(line, before);
+    const nlohmann::json said = nlohmann::json::parse(line);
+    EXPECT_EQ(said["mine"], true) << line;
+    if (states.empty() || states.back() != said["state"]) states.push_back(said["state"]);
+  }
+  EXPECT_NE(std::search(states.begin(), states.end(), kLadder.begin(), kLadder.end()), states.end())
+      << testing::PrintToString(states);
 }
 
 TEST_F(Relay, AnInputThatCannotBeReadEndsIt) {

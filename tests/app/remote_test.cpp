@@ -1,4 +1,4 @@
-// Remotes in a hand: files, an app's frames, events through a named pipe in the place of a gamepad.
+// Events through a named pipe in the place of a gamepad, and what the loop sees of a remote in a hand.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -9,163 +9,14 @@
 #include <mutex>
 
 #include "app/remote/event_device.hpp"
-#include "app/remote/frame_device.hpp"
-#include "app/remote/frame_learning.hpp"
 #include "app/remote/hand_remote.hpp"
 #include "app/text/errors.hpp"
-#include "config/toml_reader.hpp"
 
 namespace equipoise::app {
 namespace {
 
 using ::testing::DoubleNear;
 using ::testing::HasSubstr;
-
-const std::string kShipped = std::string(EQUIPOISE_SOURCE_DIR) + "/config/remotes/";
-
-std::string refusal(const std::string& text) {
-  try {
-    (void)parse_remote(text, "remote.toml");
-  } catch (const ConfigError& e) {
-    return e.what();
-  }
-  return "";
-}
-
-const std::string kFrames =
-    "[remote]\nkind = \"frames\"\ndevice = \"/dev/ttyS1\"\nbaud = 9600\nspeed_m_s = 0.1\nturn_hz = 0.25\n"
-    "hold_s = 0.5\n[frames]\n";
-
-TEST(RemoteFile, ShippedOnesAreWhatTheySay) {
-  const RemoteFile pad = load_remote(kShipped + "gamepad.toml");
-  EXPECT_EQ(pad.kind, RemoteFile::Kind::kEvents);
-  const auto forward = std::find_if(pad.events.begin(), pad.events.end(), [](const EventBinding& b) {
-    return b.action == HandAction::kForward && b.code == ABS_Y;
-  });
-  ASSERT_NE(forward, pad.events.end());
-  EXPECT_EQ(forward->sign, -1.0);  // the kernel counts a stick upwards as negative
-  EXPECT_EQ(load_remote(kShipped + "keyboard.toml").events.size(), 14u);
-  const RemoteFile app = load_remote(kShipped + "hc06.toml");
-  EXPECT_EQ(app.kind, RemoteFile::Kind::kFrames);
-  EXPECT_EQ(app.frames.size(), kHandActions.size());
-}
-
-TEST(RemoteFile, IsReadStrictly) {
-  EXPECT_EQ(refusal(kFrames + "arm = \"41\"\ndisarm = \"61\"\n"), "");
-  EXPECT_THAT(refusal(kFrames + "arm = \"41\"\n"), HasSubstr("needs arm and disarm"));
-  EXPECT_THAT(refusal(kFrames + "arm = \"41\"\ndisarm = \"41\"\n"), HasSubstr("41 is disarm and arm"));
-  EXPECT_THAT(refusal(kFrames + "arm = \"4142\"\ndisarm = \"41\"\n"), HasSubstr("begins with"));
-  EXPECT_THAT(refusal(kFrames + "arm = \"4\"\ndisarm = \"61\"\n"), HasSubstr("hexadecimal"));
-  EXPECT_THAT(refusal(kFrames + "arm = \"41\"\ndisarm = \"61\"\nfly = \"46\"\n"), HasSubstr("fly"));
-  const std::string events =
-      "[remote]\nkind = \"events\"\ndevice = \"/dev/input/event0\"\nspeed_m_s = 0.1\nturn_hz = 0.25\n"
-      "hold_s = 2.0\n[events]\narm = \"BTN_START\"\n";
-  EXPECT_EQ(refusal(events + "disarm = \"BTN_EAST KEY_ESC\"\n"), "");
-  EXPECT_THAT(refusal(events + "disarm = \"BTN_OUEST\"\n"), HasSubstr("BTN_OUEST"));
-  EXPECT_THAT(refusal(events + "disarm = \"ABS_X\"\n"), HasSubstr("an axis moves and turns"));
-}
-
-TEST(FrameMatcher, FindsFramesAmongRubbish) {
-  const std::vector<FrameBinding> frames{
-      {HandAction::kForward, "~F\n"}, {HandAction::kBack, "~B\n"}, {HandAction::kArm, "~~A\n"}};
-  FrameMatcher matcher(frames);
-  std::vector<HandAction> heard;
-  for (const char byte : std::string("~F\n~~F\nx~x~B~B\n~~A\n~~~A\n")) {
-    const auto action = matcher.push(byte);
-    if (action) heard.push_back(*action);
-  }
-  EXPECT_THAT(heard, ::testing::ElementsAre(HandAction::kForward, HandAction::kForward, HandAction::kBack,
-                                            HandAction::kArm, HandAction::kArm));
-}
-
-TEST(ButtonPad, AButtonLastsAsLongAsItsFramesCome) {
-  ButtonPad pad(0.5);
-  double now = 100.0;
-  for (int i = 0; i < 10; ++i, now += 0.4) {
-    pad.press(HandAction::kForward, now);
-    EXPECT_EQ(pad.hand(now + 0.3).forward, 1.0);
-  }
-  EXPECT_EQ(pad.hand(now + 0.2).forward, 0.0);  // 0.6 s after the last one: let go, or out of range
-  EXPECT_FALSE(pad.hand(now + 0.2).heard);
-}
-
-TEST(ButtonPad, StopLetsGoOfEverything) {
-  ButtonPad pad(0.5);
-  pad.press(HandAction::kForward, 1.0);
-  pad.press(HandAction::kTurnLeft, 1.1);
-  EXPECT_EQ(pad.hand(1.2).turn, 1.0);
-  pad.press(HandAction::kStop, 1.2);
-  EXPECT_EQ(pad.hand(1.2).turn, 0.0);
-  EXPECT_EQ(pad.hand(1.2).forward, 0.0);
-}
-
-TEST(ButtonPad, OneFrameDoesNotArm) {
-  ButtonPad pad(0.5);
-  pad.press(HandAction::kArm, 10.0);
-  EXPECT_FALSE(pad.hand(10.0).arm);
-  pad.press(HandAction::kArm, 11.5);
-  EXPECT_FALSE(pad.hand(11.5).arm) << "too long ago to be the same wish";
-  pad.press(HandAction::kArm, 11.8);
-  EXPECT_TRUE(pad.hand(11.8).arm);
-  pad.press(HandAction::kArm, 11.9);
-  EXPECT_FALSE(pad.hand(11.9).arm) << "held on, it is one press";
-  pad.press(HandAction::kDisarm, 12.0);
-  EXPECT_TRUE(pad.hand(12.0).disarm);
-  pad.press(HandAction::kArm, 12.1);
-  EXPECT_FALSE(pad.hand(12.1).arm) << "a disarm forgets the first half of an arm";
-}
-
-TEST(HandGate, NothingMovesBeforeEverythingWasLetGo) {
-  Hand pushed;
-  pushed.heard = true;
-  pushed.forward = 1.0;
-  pushed.left = -1.0;
-  pushed.turn = 0.5;
-  HandGate gate;
-  EXPECT_EQ(gate.limit(pushed).forward, 0.0) << "held since before the start";
-  (void)gate.limit(Hand{});
-  const Hand moved = gate.limit(pushed);
-  EXPECT_THAT(moved.forward, DoubleNear(std::sqrt(0.5), 1e-12));  // the diagonal is no faster
-  EXPECT_THAT(moved.left, DoubleNear(-std::sqrt(0.5), 1e-12));
-  EXPECT_EQ(moved.turn, 0.5);
-  pushed.arm = true;
-  EXPECT_EQ(gate.limit(pushed).turn, 0.0);
-  pushed.arm = false;
-  EXPECT_EQ(gate.limit(pushed).turn, 0.0) << "still the same push as when it was armed";
-  (void)gate.limit(Hand{});
-  EXPECT_EQ(gate.limit(pushed).turn, 0.5);
-}
-
-std::vector<Portion> portions(const std::vector<std::string>& bytes, double every_s) {
-  std::vector<Portion> out;
-  for (const std::string& each : bytes) out.push_back({static_cast<double>(out.size()) * every_s, each});
-  return out;
-}
-
-TEST(FrameLearning, KnowsWhatAppsDo) {
-  const LearntButton held = learn_button(portions({"F", "F", "FFF", "F"}, 0.1));
-  EXPECT_EQ(held.frame, "F");
-  EXPECT_EQ(held.released + held.error, "");
-  const LearntButton once = learn_button(portions({"~up\r\n", "~off\r\n"}, 1.8));
-  EXPECT_EQ(once.frame, "~up\r\n");
-  EXPECT_EQ(once.released, "~off\r\n");
-  EXPECT_EQ(once.error, "");
-  // In pieces as the port gives them, repeated, then let go.
-  const LearntButton pieces =
-      learn_button({{0.0, "~"}, {0.01, "up"}, {0.2, "~u"}, {0.21, "p~up"}, {0.9, "0"}});
-  EXPECT_EQ(pieces.frame, "~up");
-  EXPECT_EQ(pieces.released, "0");
-  EXPECT_EQ(pieces.error, "");
-}
-
-TEST(FrameLearning, SaysWhatIsNoButton) {
-  EXPECT_EQ(learn_button({}).error, "nothing came");
-  EXPECT_THAT(learn_button(portions({"X1", "X2", "X3"}, 0.1)).error, HasSubstr("a value or a counter"));
-  EXPECT_THAT(learn_button(portions({"S", "F", "S"}, 0.1)).error, HasSubstr("a value or a counter"));
-  std::string long_one;
-  for (int i = 0; i < 40; ++i) long_one.push_back(static_cast<char>(i));
-  EXPECT_THAT(learn_button(portions({long_one}, 0.1)).error, HasSubstr("32 bytes"));
-}
 
 /// A named pipe with the kernel's records, a stick (ABS_Y) and a key in the place of a gamepad.
 class EventRemote : public ::testing::Test {
@@ -177,7 +28,7 @@ class EventRemote : public ::testing::Test {
                              "\"\nspeed_m_s = 0.2\nturn_hz = 0.5\nhold_s = 10.0\n[events]\n"
                              "axis_range = [0, 255]\narm = \"BTN_START\"\ndisarm = \"BTN_EAST\"\n"
                              "forward = \"-ABS_Y KEY_W\"\nback = \"KEY_S\"\nturn_left = \"-ABS_RX\"\n"
-                             "stop = \"BTN_SOUTH\"\n",
+                             "stop = \"BTN_SOUTH\"\nheading_reset = \"KEY_H\"\n",
                          "events.toml");
   }
   void TearDown() override { unplug(); }
@@ -246,6 +97,81 @@ TEST_F(EventRemote, AStickBeyondItsRangeIsAtItsEnd) {
   put(EV_KEY, KEY_W, 1);
   put(EV_ABS, ABS_Y, -400);
   EXPECT_EQ(device.look(0).forward, 1.0) << "nor are two forward";
+}
+
+TEST_F(EventRemote, EveryWayAndEveryPressIsTold) {
+  file_ = parse_remote("[remote]\nkind = \"events\"\ndevice = \"" + path_ +
+                           "\"\nspeed_m_s = 0.2\nturn_hz = 0.5\nhold_s = 10.0\n[events]\n"
+                           "axis_range = [-100, 100]\narm = \"KEY_A\"\ndisarm = \"KEY_Q\"\n"
+                           "left = \"KEY_LEFT\"\nright = \"ABS_X KEY_RIGHT\"\nturn_left = \"KEY_J\"\n"
+                           "turn_right = \"ABS_RX KEY_L\"\nheading_reset = \"KEY_H\"\nstop = \"KEY_S\"\n",
+                       "events.toml");
+  EventDevice device(file_);
+  const auto press = [&](int key) {
+    put(EV_KEY, key, 1);
+    const Hand hand = device.look(0);
+    put(EV_KEY, key, 0);
+    (void)device.look(0);
+    return hand;
+  };
+  EXPECT_EQ(press(KEY_LEFT).left, 1.0);
+  EXPECT_EQ(press(KEY_RIGHT).left, -1.0);
+  EXPECT_EQ(press(KEY_J).turn, 1.0);
+  EXPECT_EQ(press(KEY_L).turn, -1.0);
+  const Hand reset = press(KEY_H);
+  EXPECT_TRUE(reset.heading_reset && !reset.arm && !reset.disarm);
+  const Hand arm = press(KEY_A);
+  EXPECT_TRUE(arm.arm && !arm.disarm && !arm.heading_reset);
+  const Hand disarm = press(KEY_Q);
+  EXPECT_TRUE(disarm.disarm && !disarm.arm && !disarm.heading_reset);
+  for (const int axis : {ABS_X, ABS_RX}) {
+    put(EV_ABS, axis, 0);
+    put(EV_ABS, axis, 55);
+  }
+  const Hand hand = device.look(0);
+  EXPECT_NEAR(hand.left, -0.5, 1e-12) << "half way between the dead zone and the end";
+  EXPECT_NEAR(hand.turn, -0.5, 1e-12);
+  put(EV_ABS, ABS_X, 10);
+  put(EV_REL, KEY_LEFT, 1);
+  put(EV_KEY, ABS_RX, 0);
+  EXPECT_EQ(device.look(0).left, 0.0) << "the dead zone's edge; other kinds of event are none";
+  put(EV_KEY, KEY_J, 1);
+  EXPECT_NEAR(device.look(0).turn, 0.5, 1e-12);
+  put(EV_KEY, KEY_S, 1);
+  EXPECT_EQ(device.look(0).turn, 0.0);
+}
+
+TEST_F(EventRemote, AFloodIsReadInParts) {
+  EventDevice device(file_);
+  for (int i = 0; i < 255; ++i) put(EV_SYN, SYN_REPORT, 0);
+  put(EV_KEY, BTN_START, 1);
+  put(EV_KEY, BTN_EAST, 1);
+  const Hand first = device.look(0);
+  EXPECT_TRUE(first.arm && !first.disarm) << "256 of them";
+  const Hand second = device.look(0);
+  EXPECT_TRUE(second.disarm && !second.arm);
+}
+
+TEST_F(EventRemote, AnArmBeforeTheLossIsVoidADisarmIsNot) {
+  EventDevice device(file_);
+  put(EV_KEY, BTN_START, 1);
+  put(EV_KEY, BTN_EAST, 1);
+  unplug();
+  const Hand hand = device.look(0);
+  EXPECT_FALSE(hand.arm || hand.present);
+  EXPECT_TRUE(hand.disarm);
+}
+
+TEST_F(EventRemote, LooksForAsLongAsItIsToldOrUntilSomethingComes) {
+  EventDevice device(file_);
+  const auto passed = [&](int milliseconds) {
+    const auto began = std::chrono::steady_clock::now();
+    (void)device.look(milliseconds);
+    return std::chrono::steady_clock::now() - began;
+  };
+  EXPECT_GE(passed(30), std::chrono::milliseconds(30));
+  put(EV_KEY, KEY_W, 1);
+  EXPECT_LT(passed(60'000), std::chrono::seconds(30));
 }
 
 TEST_F(EventRemote, AStickWhosePastIsUnknownWaitsUntilItIsAtRest) {
@@ -348,6 +274,25 @@ TEST_F(EventRemote, FliesAndItsLossStopsTheMotionButNotTheMotors) {
   EXPECT_TRUE(flight.wait([](const Command& c) { return !c.arm; }));
 }
 
+TEST_F(EventRemote, FullDeflectionIsWhatTheFileSays) {
+  file_ = parse_remote("[remote]\nkind = \"events\"\ndevice = \"" + path_ +
+                           "\"\nspeed_m_s = 0.2\nturn_hz = 0.5\nhold_s = 10.0\n[events]\n"
+                           "arm = \"KEY_A\"\ndisarm = \"KEY_Q\"\nleft = \"KEY_LEFT\"\n"
+                           "turn_right = \"KEY_L\"\nheading_reset = \"KEY_H\"\n",
+                       "events.toml");
+  Flight flight(file_);
+  put(EV_KEY, KEY_A, 1);
+  EXPECT_TRUE(flight.wait([](const Command& c) { return c.arm; }));
+  put(EV_KEY, KEY_LEFT, 1);
+  EXPECT_TRUE(flight.wait([](const Command& c) { return c.velocity_W_m_s == Vec2(0.0, 0.2); }));
+  put(EV_KEY, KEY_L, 1);
+  EXPECT_TRUE(flight.wait([](const Command& c) { return std::abs(c.yaw_rate_rad_s + kPi) < 1e-12; }))
+      << "half a turn per second, clockwise";
+  put(EV_KEY, KEY_H, 1);
+  EXPECT_TRUE(flight.wait([](const Command& c) { return c.heading_reset; }));
+  EXPECT_TRUE(flight.wait([](const Command& c) { return c.arm && !c.heading_reset; }));
+}
+
 TEST_F(EventRemote, WhatHappensIsSaidOnce) {
   std::mutex lock;
   std::vector<std::string> said;
@@ -378,10 +323,17 @@ TEST_F(EventRemote, WhatHappensIsSaidOnce) {
   EXPECT_TRUE(comes(all));
   usleep(100000);
   EXPECT_TRUE(comes(all));
+  said.clear();
+  put(EV_KEY, BTN_EAST, 1);
+  put(EV_KEY, KEY_H, 1);
+  EXPECT_TRUE(comes({"the remote disarms", "the remote resets the heading"}));
+  put(EV_KEY, BTN_EAST, 1);
+  usleep(100000);
+  EXPECT_TRUE(comes({"the remote disarms", "the remote resets the heading"})) << "is off already";
 }
 
 TEST_F(EventRemote, AnArmThatWasNotObeyedInTimeIsForgotten) {
-  HandRemote remote(open_hand(file_), {0.2, 0.5, 0.5, {}});
+  HandRemote remote(open_hand(file_), {0.2, 0.5, 3.0, {}});
   put(EV_KEY, BTN_START, 1);
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   bool asked = false;

@@ -11,6 +11,8 @@
 #include <chrono>
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
+#include <iterator>
 #include <string>
 #include <thread>
 #include <vector>
@@ -84,6 +86,54 @@ TEST_F(Manager, IsFoundUnderANameWithoutAFile) {
   const ssize_t length = recv(fd, text, sizeof text, 0);
   EXPECT_EQ(std::string(text, static_cast<std::size_t>(std::max<ssize_t>(length, 0))), "READY=1");
   close(fd);
+}
+
+/// Without a watchdog a beat a second is enough, but ready is said at once.
+TEST_F(Manager, WithoutAWatchdogHearsAtOnceThatItIsReady) {
+  for (const char* allowed : {"", "0", "-5", "soon"}) {
+    setenv("WATCHDOG_USEC", allowed, 1);
+    (void)heard();  // the end of the one before
+    ServiceNotify service;
+    const auto began = std::chrono::steady_clock::now();
+    std::vector<std::string> told;
+    for (int tick = 0; told.empty() && tick < 400; ++tick, wait(5)) {
+      service.note(tick);
+      told = heard();
+    }
+    EXPECT_EQ(told, std::vector<std::string>{"READY=1\nWATCHDOG=1"}) << allowed;
+    for (int tick = 400; tick < 440; ++tick, wait(5)) service.note(tick);
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - began;
+    EXPECT_LE(static_cast<double>(heard().size()), passed.count()) << allowed;
+  }
+}
+
+TEST_F(Manager, ThatDoesNotListenHoldsNobodyUpAndLeavesNothingOpen) {
+  const auto descriptors = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
+  };
+  const auto before = descriptors();
+  for (int i = 0; i < 2000; ++i) notify_service_manager("WATCHDOG=1");
+  EXPECT_EQ(descriptors(), before);
+}
+
+TEST_F(Manager, MayHaveANameOf107Characters) {
+  const auto told = [](std::size_t length) {
+    const std::string name = "@" + std::string(length - 1, 'x');
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::memcpy(address.sun_path + 1, name.data() + 1, length - 1);
+    const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length);
+    EXPECT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), size), 0);
+    setenv("NOTIFY_SOCKET", name.c_str(), 1);
+    notify_service_manager("READY=1");
+    char text[100];
+    const ssize_t count = recv(fd, text, sizeof text, 0);
+    close(fd);
+    return count > 0;
+  };
+  EXPECT_TRUE(told(107));
+  EXPECT_FALSE(told(108)) << "no room for the end of a file's name";
 }
 
 TEST_F(Manager, ThatIsNotThereOrHasTooLongANameIsNotToldAnything) {

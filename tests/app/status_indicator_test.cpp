@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <string>
+#include <thread>
 
 namespace equipoise::app {
 namespace {
@@ -19,6 +21,27 @@ TEST(StatusIndicator, LightsTellArmedReadyAndForbidden) {
     const auto forbidden = StatusIndicator::lights(ArmState::kDisarmed, kNotRequested | kBatteryLow, turn);
     EXPECT_TRUE(!forbidden.green && forbidden.red);
   }
+}
+
+TEST(StatusIndicator, WhatCannotBeOpenedIsAWarning) {
+  Board board;
+  board.led_green = {"/dev/no-such-chip", 1};
+  board.led_red = {"/dev/null", 2};
+  testing::internal::CaptureStderr();
+  { const StatusIndicator without_can(board); }
+  const std::string lights = testing::internal::GetCapturedStderr();
+  EXPECT_NE(lights.find("warning: LED green: "), std::string::npos) << lights;
+  EXPECT_NE(lights.find("warning: LED red: "), std::string::npos) << lights;
+  EXPECT_EQ(lights.find("CAN"), std::string::npos) << lights;
+  board.can_interface = "no-such-can";
+  testing::internal::CaptureStderr();
+  {
+    StatusIndicator indicator(board);
+    indicator.tell(ArmState::kArmed, 0, 7.8);
+    std::this_thread::sleep_for(2 * StatusIndicator::kTurn);
+  }
+  const std::string all = testing::internal::GetCapturedStderr();
+  EXPECT_NE(all.find("warning: no status on CAN: no-such-can: "), std::string::npos) << all;
 }
 
 TEST(StatusIndicator, FrameHoldsEveryReason) {

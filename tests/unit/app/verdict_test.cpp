@@ -73,6 +73,85 @@ TEST(Verdict, ARobotThatNeverArmedIsDisarmed) {
   EXPECT_EQ(judge.verdict(false, false).ended, Ended::kFinished);
 }
 
+TEST(Verdict, ARequestIsTimedFromItsOwnBeginning) {
+  VerdictJudge judge;
+  judge.observe({0.5, true, false, kBatteryLow, kUnknown});
+  judge.observe({0.55, false, false, kNotRequested, kUnknown});
+  judge.observe({2.0, true, false, kBatteryLow, kUnknown});
+  EXPECT_FALSE(judge.refused()) << "asked for anew";
+  judge.observe({2.09, true, false, kBatteryLow, kUnknown});
+  EXPECT_FALSE(judge.refused());
+  judge.observe({2.11, true, false, kBatteryLow, kUnknown});
+  EXPECT_TRUE(judge.refused());
+  EXPECT_EQ(judge.verdict(false, false).fell_at_s, 2.11);
+}
+
+TEST(Verdict, ATiltNearTheFallIsOneWhereSafetySaysSo) {
+  const auto ended = [](double tilt_rad, std::uint32_t reasons) {
+    VerdictJudge judge = balancing();
+    judge.observe({3.2, true, false, reasons, tilt_rad});
+    return judge.verdict(false, false).ended;
+  };
+  EXPECT_EQ(ended(0.55, kTilt), Ended::kFell);
+  EXPECT_EQ(ended(0.53, kTilt), Ended::kDisarmed);
+  EXPECT_EQ(ended(0.59, kImuStale), Ended::kDisarmed);
+  EXPECT_EQ(ended(0.61, kImuStale), Ended::kFell);
+  VerdictJudge upright = balancing();
+  upright.observe({3.2, true, true, 0, 0.59});
+  EXPECT_FALSE(upright.lost());
+}
+
+TEST(Verdict, EveryEndIsASentence) {
+  Verdict v;
+  v.duration_s = 4.25;
+  v.reasons = kNotRequested;
+  EXPECT_EQ(v.sentence(), "Finished after 4.2 s, motors off: not_requested");
+  v.ended = Ended::kInterrupted;
+  EXPECT_EQ(v.sentence(), "Interrupted after 4.2 s, motors off: not_requested");
+  v.ended = Ended::kDevice;
+  v.reasons = 0;
+  EXPECT_EQ(v.sentence(), "The device failed after 4.2 s, upright");
+  v.ended = Ended::kFell;
+  v.fell_at_s = 3.5;
+  EXPECT_EQ(v.sentence(), "Fell over at 3.50 s");
+  v.reasons = kTilt;
+  EXPECT_EQ(v.sentence(), "Fell over at 3.50 s: tilt");
+}
+
+TEST(Verdict, IsTheSameFromALog) {
+  for (const Ended ended :
+       {Ended::kFinished, Ended::kFell, Ended::kDisarmed, Ended::kInterrupted, Ended::kDevice}) {
+    Verdict v;
+    v.ended = ended;
+    v.reasons = kTilt;
+    v.fell_at_s = 3.5;
+    v.duration_s = 4.0;
+    EXPECT_EQ(std::isnan(v.record().fell_at_s), !v.fell());
+    const Verdict read = Verdict::of(v.record());
+    EXPECT_EQ(read.ended, ended);
+    EXPECT_EQ(read.reasons, v.reasons);
+    EXPECT_EQ(read.fell_at_s, v.fell() ? 3.5 : 0.0);
+    EXPECT_EQ(read.duration_s, 4.0);
+  }
+  for (const std::int32_t unknown : {-1, 5, 1000})
+    EXPECT_EQ(Verdict::of({unknown, 0, 1.0, 2.0}).ended, Ended::kFinished) << unknown;
+}
+
+TEST(Verdict, TheNumbersAreThoseOfTheTickThatLostTheRobot) {
+  VerdictJudge judge;
+  ReasonNumbers numbers;
+  judge.observe({0.0, true, false, 0, kUnknown, numbers});
+  EXPECT_FALSE(judge.verdict(false, false).numbers.was_armed);
+  EXPECT_FALSE(judge.armed());
+  judge.observe({0.1, true, true, 0, kUnknown, numbers});
+  EXPECT_TRUE(judge.armed());
+  judge.observe({0.2, true, false, kTilt, kUnknown, numbers});
+  EXPECT_TRUE(judge.verdict(false, false).numbers.was_armed);
+  judge.observe({0.3, false, false, kNotRequested, kUnknown, numbers});
+  EXPECT_EQ(judge.verdict(false, false).reasons, kTilt);
+  EXPECT_EQ(judge.verdict(false, false).duration_s, 0.3);
+}
+
 TEST(Verdict, AFailedDeviceSaysSo) {
   nlohmann::json out;
   balancing().verdict(false, true).write(&out);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "equipoise/control/allocate.hpp"
+#include "equipoise/control/chain.hpp"
 #include "robots/mip/design.hpp"
 
 namespace equipoise {
@@ -109,6 +110,24 @@ TEST(SmoothVelocity, FeedsForwardTheChangeOfItsAccelerationAndForgetsAllOnReset)
   EXPECT_EQ(v.jerk(), Vec2(0.0, 0.0));
   v.update(Vec2::Zero(), kLimits);
   EXPECT_EQ(v.velocity(), Vec2(0.0, 0.0)) << "nothing is missing";
+}
+
+/// The last bit of the way is closed within a tenth of a second, whatever the limits.
+TEST(SmoothVelocity, ClosesTheLastBitLikeALowPass) {
+  SmoothVelocity<1> v;
+  v.update(Vec<1>(0.3), {100.0, 1000.0});
+  EXPECT_NEAR(v.acceleration()(0), 10.0 * 0.3, 1e-12);
+  SmoothVelocity<1> limited;
+  limited.update(Vec<1>(0.3), {2.5, 1000.0});
+  EXPECT_NEAR(limited.acceleration()(0), 2.5, 1e-12);
+  SmoothVelocity<1> quick;  // no faster than it arrives
+  quick.update(Vec<1>(0.003), {1.0, std::numeric_limits<double>::infinity()});
+  EXPECT_NEAR(quick.velocity()(0), 0.003, 1e-15);
+}
+
+TEST(Chain, WithoutAnEntryNothingIsLate) {
+  const Chain none;
+  EXPECT_EQ(none.gyro_delay_s + none.accel_delay_s + none.attitude_delay_s + none.actuation_delay_s, 0.0);
 }
 
 TEST(DutyBudget, WithoutRoomForMotionThereIsNone) {

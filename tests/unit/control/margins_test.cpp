@@ -115,6 +115,31 @@ TEST(Margins, AJumpFromTheFarSideIsNoCrossing) {
       margins({1.0, 2.0}, {-std::polar(2.0, 1.0), -std::polar(2.0, -1.0)}, 0.0, 0.0).gain_down_dB));
 }
 
+/// Points on the unit circle and on the real axis themselves.
+TEST(Margins, ACrossingMayBeAPointOfTheCurve) {
+  const Margins on_the_circle = margins({1.0, 2.0}, {-std::polar(1.0, 0.5), -std::polar(0.5, 0.5)}, 0.0);
+  EXPECT_NEAR(on_the_circle.phase_deg, 0.5 * 90.0 / kHalfPi, 1e-9);
+  EXPECT_NEAR(on_the_circle.delay_s, 0.5, 1e-9);
+  const Margins at_its_end = margins({1.0, 2.0}, {-std::polar(0.5, 0.5), -std::polar(1.0, 0.5)}, 0.0);
+  EXPECT_NEAR(at_its_end.delay_s, 0.25, 1e-9);
+  const Margins on_the_axis = margins({1.0, 2.0}, {-std::polar(2.0, 0.5), -std::polar(2.0, 0.0)}, 0.0);
+  EXPECT_NEAR(on_the_axis.gain_down_dB, -20.0 * std::log10(2.0), 1e-9);
+  const Margins at_the_limit = margins({1.0, 2.0}, {-std::polar(1.0, 0.5), -std::polar(1.0, -0.5)}, 0.0);
+  EXPECT_EQ(at_the_limit.gain_up_dB, 0.0);
+  EXPECT_EQ(at_the_limit.gain_down_dB, 0.0);
+}
+
+/// Half of the way in size, in angle and in frequency.
+TEST(Margins, BetweenTwoPointsTheCurveIsFollowed) {
+  const Margins m = margins({1.0, 3.0}, {-std::polar(2.0, 0.25), -std::polar(0.5, 0.75)}, 0.0);
+  EXPECT_NEAR(m.phase_deg, 0.5 * 90.0 / kHalfPi, 1e-9);
+  EXPECT_NEAR(m.delay_s, 0.5 / 2.0, 1e-9);
+  const Margins late = margins({1.0, 3.0}, {-std::polar(2.0, -0.25), -std::polar(0.5, -0.75)}, 0.0);
+  EXPECT_NEAR(late.phase_deg, 0.5 * 90.0 / kHalfPi, 1e-9);
+  EXPECT_NEAR(late.delay_s, (4.0 * kHalfPi - 0.5) / 2.0, 1e-9) << "nearly a whole turn";
+  EXPECT_TRUE(std::isinf(margins({0.5}, {-std::polar(2.0, 0.25)}, 0.0).phase_deg)) << "one point is none";
+}
+
 TEST(Margins, TheWorseOfTwoIsTheWorseInEach) {
   const Margins a{6.0, -3.0, 40.0, 0.01, 1.0};
   const Margins b{5.0, -4.0, 50.0, 0.02, 0.5};

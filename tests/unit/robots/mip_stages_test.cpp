@@ -133,10 +133,21 @@ TEST(MipReference, ErrorsAreReferenceMinusEstimate) {
   EXPECT_FALSE(stage.update(Command{}, x).restart);
   x.phi = 50.0;  // carried away
   EXPECT_EQ(stage.update(Command{}, x).d_phi, -6.0);
+  x.phi = -50.0;
+  EXPECT_EQ(stage.update(Command{}, x).d_phi, 6.0);
   const StateView v = view(ref, MipParameters{});
   EXPECT_EQ(v.theta_rad, Vec3(0.0, 0.0, -2.0));
   EXPECT_EQ(v.phi_rad, Vec2(5.0, 0.0));
   EXPECT_EQ(v.position_W_m, Vec2(1.0, 2.0));
+}
+
+TEST(MipReference, ItsViewIsWhereTheRobotShouldBe) {
+  MipReference ref;
+  ref.phi_dot = 0.5;
+  ref.psi_dot = 0.25;
+  const StateView v = view(ref, MipParameters{});
+  EXPECT_EQ(v.omega_B_rad_s, Vec3(0.0, 0.0, 0.25));
+  EXPECT_EQ(v.phi_dot_rad_s, Vec2(0.5, 0.0));
 }
 
 TEST(MipReference, AResetForgetsTheMotion) {
@@ -263,6 +274,43 @@ TEST(MipSlcFeedback, IsTheDifferenceEquationOfItsTwoLoops) {
   EXPECT_EQ(feedback.update(one_error(&MipReference::d_psi, 0.25)).y(), 0.5);
   EXPECT_EQ(feedback.update(one_error(&MipReference::d_psi_dot, 1.0)).y(), 0.5);
   EXPECT_EQ(feedback.update(one_error(&MipReference::psi_dot, 4.0)).y(), 0.5);
+}
+
+/// [T]'s library runs at 100 Hz: every other tick, with its own filters and gains of yaw.
+TEST(MipSlcFeedback, AsPublishedRunsEveryOtherTick) {
+  MipSlcParams p;
+  p.published = true;
+  p.gains.slc.D1 = p.gains.slc.D2 = {1000.0, 0.0, 0.0, 0.0, 0.0};
+  p.gains.yaw.angle = 1000.0;
+  p.gains.yaw_published.angle = 2.0;
+  p.max_u = 100.0;
+  p.soft_start_s = 0.0;
+  MipSlcFeedback feedback(p);
+  const auto u = [&feedback](double d_theta) {
+    return feedback.update(one_error(&MipReference::d_theta, d_theta)).x();
+  };
+  const double first = u(1.0);
+  EXPECT_DOUBLE_EQ(first, kMipPublishedD1.b0);
+  EXPECT_EQ(u(5.0), first);
+  EXPECT_DOUBLE_EQ(u(0.0), kMipPublishedD1.b1 - kMipPublishedD1.a1 * first);
+  EXPECT_EQ(feedback.update(one_error(&MipReference::d_psi, 0.25)).y(), 0.5);
+  MipSlcFeedback outer(p);
+  EXPECT_DOUBLE_EQ(outer.update(one_error(&MipReference::d_phi, 0.1)).x(),
+                   0.1 * kMipPublishedD2.b0 * kMipPublishedD1.b0);
+}
+
+/// A restart in the middle of the soft start and of two ticks begins both anew.
+TEST(MipSlcFeedback, ARestartBeginsAnew) {
+  MipSlcParams p;
+  p.published = true;
+  p.max_u = 1.0;
+  p.soft_start_s = 0.1;
+  MipSlcFeedback feedback(p);
+  MipReference ref = one_error(&MipReference::d_theta, 9.0);
+  for (int k = 0; k < 11; ++k) feedback.update(ref);
+  EXPECT_EQ(std::abs(feedback.update(ref).x()), 0.5);
+  ref.restart = true;
+  EXPECT_EQ(feedback.update(ref).x(), 0.0);
 }
 
 }  // namespace
