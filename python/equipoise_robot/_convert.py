@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,10 +20,16 @@ def convert(
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder to make (default: beside the log)")
     given = parser.parse_args(arguments)
     out = given.out or given.log.with_suffix(f".{to}")
+    there = out.exists()
     try:
         log = Log(given.log)
         counts = write(log, out)
-    except (UserError, OSError, ModuleNotFoundError) as error:
+    except (ArithmeticError, LookupError, ModuleNotFoundError, OSError, TypeError, ValueError) as error:
+        if not isinstance(error, (ModuleNotFoundError, OSError, UserError)):  # a log that somebody made up
+            why = " ".join(f"{type(error).__name__}: {error}".split())
+            error = UserError(f"{given.log}: no log as equipoise writes it ({why})")
+        if not there:
+            shutil.rmtree(out, ignore_errors=True)
         print(f"error: {error}", file=sys.stderr)
         return 2
     for note in log.notes:

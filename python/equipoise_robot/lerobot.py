@@ -57,7 +57,9 @@ def _features(log: Log) -> dict[str, tuple[list[str], Array]]:
         names = [n for q, parts in quantities.items() for n in ([f"{q}.{p}" for p in parts] or [q])]
         values = np.column_stack([records[q] for q in quantities]) if len(tick) else np.empty((0, len(names)))
         found[key] = names, values.astype(np.float32)
-    count = int(motors["motors"][0])
+    count = int(motors["motors"][0]) if len(motors) else 0
+    if not 1 <= count <= motors["duty"].shape[1]:
+        raise UserError(f"{log.path}: says that it has {count} motors")
     found["action"] = [f"duty.{i}" for i in range(count)], rows(ch.MOTORS)["duty"][:, :count].astype(
         np.float32
     )

@@ -207,7 +207,10 @@ class Log(dict[str, np.ndarray]):
             names = ("gyro_counts", "accel_counts", "encoder_counts", "battery_counts", "attitude_wxyz")
             # Copies: of a single row NumPy says that it is contiguous, and the core that it is not.
             packed = [np.array(raw[name], np.float64, order="C") for name in names]
-            values: np.ndarray = _core.calibrated(run.robot, run.config_toml, *packed)
+            try:
+                values: np.ndarray = _core.calibrated(run.robot, run.config_toml, *packed)
+            except ValueError as error:
+                raise UserError(f"{self.path}: {error}") from None
             return values
 
         wheels = calibrated(self[ch.SENSORS][:1]).shape[1] - 10

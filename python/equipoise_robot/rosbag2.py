@@ -78,7 +78,12 @@ class Messages:
         with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
             file.write(log.run.config_toml)
             file.flush()
-            _, self.d = models.dimensions(file.name)
+            try:
+                described, self.d = models.dimensions(file.name)
+            except UserError as error:
+                raise UserError(str(error).replace(file.name, f"{log.path}: configuration")) from None
+        if described != self.robot:
+            raise UserError(f"{log.path}: is of {self.robot}, its configuration of {described}")
         self.radius_m = models.rolling_radius_m(self.robot, self.d)
         self.R_FB = models.R_FB[self.robot]
 

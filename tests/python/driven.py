@@ -8,3 +8,21 @@ CONFIGS = {"mbbr": "mbbr", "mip": "edumip"}
 def equipoise(root, *arguments):
     command = [root / "build/host/equipoise", *arguments]
     return subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+
+
+def rewritten(path, log, change, run=lambda message: None):
+    """The log with every message changed, its description by `run`; where one says False, it is left out."""
+    import equipoise as types
+    from equipoise_robot.channels import RUN
+
+    import lcm
+
+    kinds = [getattr(types, name) for name in dir(types) if name.endswith("_t")]
+    of = {kind._get_packed_fingerprint(): kind for kind in kinds}
+    out = lcm.EventLog(str(path), "w", overwrite=True)
+    for event in lcm.EventLog(str(log)):
+        message = of[event.data[:8]].decode(event.data)
+        if (run if event.channel == RUN else change)(message) is not False:
+            out.write_event(event.timestamp, event.channel, message.encode())
+    out.close()
+    return path

@@ -87,6 +87,32 @@ def test_a_request_of_any_shape_leaves_the_page_its_control(cockpit):
     in_a_loop(run())
 
 
+def test_a_log_that_goes_while_it_is_listed_leaves_the_page_its_control(cockpit, logs):
+    """Short of space, a run deletes its own."""
+    gone = logs / "gone.lcm"
+
+    async def run():
+        stop = asyncio.Event()
+
+        async def come_and_go():
+            while not stop.is_set():
+                gone.write_bytes(b"")
+                await asyncio.sleep(0)
+                gone.unlink()
+                await asyncio.sleep(0)
+
+        both = asyncio.create_task(come_and_go())
+        requests = [{"do": "take"}, *[{"do": "logs"}] * 300, {"do": "jump"}]
+        told = await as_client(cockpit, *requests, error="jump: not understood")
+        stop.set()
+        await both
+        return told
+
+    events = in_a_loop(run())
+    assert isinstance(events, list)  # not closed
+    assert any("logs" in event for event in events)
+
+
 def test_who_has_not_taken_control_cannot_restart_a_robot_that_runs(cockpit):
     cockpit.firmware()
     in_a_loop(as_client(cockpit, {"do": "restart"}, error="take control first"))

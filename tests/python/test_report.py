@@ -12,6 +12,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 import synthetic
+from driven import rewritten
 from equipoise_robot.log import read_log
 from equipoise_tools import names, report
 from equipoise_tools.interactive import Run, plots_of
@@ -196,24 +197,6 @@ def test_user_errors_are_one_line_and_status_2(tmp_path, capsys, known_log):
     blocked.write_text("")
     assert report.main([str(known_log), "--out", str(blocked)]) == 2
     assert capsys.readouterr().err.startswith(f"error: {blocked}")
-
-
-def rewritten(path, log, change):
-    """The log with every message but its description changed."""
-    import equipoise
-
-    import lcm
-
-    kinds = [getattr(equipoise, name) for name in dir(equipoise) if name.endswith("_t")]
-    of = {kind._get_packed_fingerprint(): kind for kind in kinds}
-    out = lcm.EventLog(str(path), "w")
-    for event in lcm.EventLog(str(log)):
-        message = of[event.data[:8]].decode(event.data)
-        if event.channel != names.RUN:
-            change(message)
-        out.write_event(event.timestamp, event.channel, message.encode())
-    out.close()
-    return path
 
 
 @pytest.mark.parametrize(

@@ -145,7 +145,9 @@ class Page(tornado.websocket.WebSocketHandler):
             await self._obey(do, request)
         except UserError as error:
             self.tell(error=str(error))
-        except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+        except OSError as error:  # a log may be deleted while it is looked for
+            self.tell(error=f"{do}: {error.strerror}")
+        except (LookupError, TypeError, ValueError, ArithmeticError, RecursionError):
             self.tell(error=f"{do}: not understood")
 
     def _greet(self, do: str, request: dict) -> None:
