@@ -28,11 +28,23 @@ def test_bad_usage_is_one_line_before_anything_is_built(root, arguments, complai
     assert len(ended.stderr.splitlines()) == 1 and complaint in ended.stderr
 
 
-def test_only_an_image_is_replaced(root, tmp_path):
-    notes = tmp_path / "notes"
+def test_only_an_image_of_a_robot_is_replaced(root, tmp_path):
+    """Not the copy of another card either, which has a boot sector, too."""
+    notes, card = tmp_path / "notes", tmp_path / "card.img"
     notes.write_text("mine\n" * 200)
-    ended = image(root, "--no-login", "--output", str(notes))
-    assert ended.returncode == 2 and f"--output {notes}: exists and is no image" in ended.stderr
+    card.write_bytes(bytes(510) + b"\x55\xaa" + bytes(5 << 20))
+    for other in (notes, card):
+        ended = image(root, "--no-login", "--output", str(other), "--size-mb", "none")  # builds nothing
+        assert ended.returncode == 2 and f"--output {other}: exists and is no image" in ended.stderr
+    ours = tmp_path / "ours.img"
+    with ours.open("wb") as file:
+        file.truncate(8 << 20)
+    at = f"offset={4 << 20}"
+    subprocess.run(
+        ["/sbin/mke2fs", "-qF", "-t", "ext4", "-L", "equipoise", "-E", at, ours, "2048k"], check=True
+    )
+    ended = image(root, "--output", str(ours), "--size-mb", "none", "--no-login")
+    assert ended.returncode == 2 and "--size-mb none" in ended.stderr, ended.stderr
 
 
 def test_a_private_key_is_refused(root, tmp_path):
