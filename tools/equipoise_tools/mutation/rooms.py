@@ -81,7 +81,9 @@ APP_TESTS = {
     "run/status_indicator": "app/status_indicator",
     "guard/service_notify": "app/service_notify",
     "commission/calibrate_imu": "app/calibrate_imu",
-    **{f"remote/{n}": "app/remote*" for n in ("hand_remote", "frame_learning", "event_device", "remote_file")},
+    **{
+        f"remote/{n}": "app/remote*" for n in ("hand_remote", "frame_learning", "event_device", "remote_file")
+    },
 }
 
 ROOMS: dict[str, Room] = {
