@@ -173,7 +173,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("log", type=Path)
     parser.add_argument("--out", type=Path, required=True, help="the picture, .gif")
     parser.add_argument("--from-s", type=float, default=0.0)
-    parser.add_argument("--duration-s", type=float, default=10.0)
+    parser.add_argument("--duration-s", type=float, default=8.0)
     parser.add_argument("--fps", type=float, default=8.0)
     parser.add_argument("--title", default="MBBR, simulated: 1 turn per second, 0.1 m/s")
     given = parser.parse_args(arguments)
