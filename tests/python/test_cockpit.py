@@ -9,6 +9,7 @@ import sys
 from collections import deque
 from pathlib import Path
 
+import numpy as np
 import pytest
 from equipoise_tools import names
 from equipoise_tools.cockpit import frames, words
@@ -214,6 +215,69 @@ def test_a_disarm_before_the_last_line_is_carried_out(root, tmp_path):
         robot.wait()
 
 
+def recorded(root, path):
+    """A run whose encoder dies and is excluded."""
+    run = [root / "build/host/equipoise", "run", "--backend", "sim", "--config", root / "config/mbbr.toml"]
+    run += ["--telemetry", "off", "--speed", "50", "--arm", "--duration-s", "6", "--log", path]
+    subprocess.run([*map(str, run), "--fault", "encoder_dead@3"], capture_output=True, check=True)
+    return path
+
+
+def test_a_log_is_filtered_again_with_another_tuning(cockpit, root, logs):
+    """The page gets both runs' numbers, then frames with the other's state; a disarm does not wait for it."""
+    recorded(root, logs / "died.lcm")
+    noise = "estimator.ekf.r=[2.08e-6, 2.08e-6, 2.08e-6, 8e-5, 8e-5, 8e-5, 1.41, 1.41]"
+
+    async def run():
+        headers = {"Origin": cockpit.origin}
+        socket = await websocket_connect(HTTPRequest(f"ws://{cockpit.host}/socket", headers=headers))
+
+        async def say(**request):
+            await socket.write_message(json.dumps(request))
+
+        async def hear(*wanted):
+            while True:
+                message = await asyncio.wait_for(socket.read_message(), PATIENCE_S)
+                if isinstance(message, bytes):
+                    if "frames" in wanted and message[0] == 0:
+                        return message
+                elif found := [name for name in wanted if name in json.loads(message)]:
+                    return json.loads(message)[found[0]]
+
+        await say(do="hello", token=cockpit.token)
+        await hear("hello")
+        await say(do="what-if", changes="safety.detection=false")
+        assert "no log is open" in await hear("error")
+        await say(do="open", log="died.lcm")
+        await hear("playback")
+        plain = await hear("frames")
+        for wrong, said in (
+            ("safety.detecton=false", "did you mean safety.detection"),
+            ("include=['/etc/passwd']", "expected table.key=value"),
+            ("--config x", "expected table.key=value"),
+        ):
+            await say(do="what-if", changes=wrong)
+            assert said in await hear("error"), wrong
+        await say(do="what-if", changes=f"safety.detection=false; {noise}")
+        await say(do="what-if", changes="safety.detection=true")
+        await say(do="nonsense")
+        first, second = await hear("error"), await hear("error", "what_if")
+        told = second if "rows" in second else await hear("what_if")
+        assert "still being filtered" in first
+        rows = {what: (was, then) for what, was, then in told["rows"]}
+        assert told["set"] == ["safety.detection=false", noise]
+        assert "without wheel" in rows["alarms"][0] and "without wheel" not in rows["alarms"][1]
+        for what in ("tilt, RMS while armed", "normalised innovation, mean while armed"):
+            assert rows[what][0] != rows[what][1]
+        assert "is no run" in told["note"]
+        assert len(await hear("frames")) > len(plain)
+        await say(do="what-if", changes="")
+        assert await hear("what_if") is None and len(await hear("frames")) == len(plain)
+        socket.close()
+
+    in_a_loop(run())
+
+
 # Its parts.
 
 
@@ -254,6 +318,26 @@ def test_a_page_that_does_not_read_loses_old_frames_and_never_events():
         assert page.waiting[-1] == (999).to_bytes(2, "big")
 
     in_a_loop(run())
+
+
+def test_frames_of_another_tuning_are_of_the_same_tick(root, tmp_path):
+    log = recorded(root, tmp_path / "died.lcm")
+    playback = Playback(log)
+    playback.filter_again(["estimator.ekf.r=[2.08e-6, 2.08e-6, 2.08e-6, 8e-5, 8e-5, 8e-5, 1.41, 1.41]"])
+    was, then = playback.log[names.STATE], playback.beside.log[names.STATE]
+    assert not np.array_equal(was["theta_rad"], then["theta_rad"])
+    layouts = frames.layouts()
+    for t_s in (1.0, 4.5):
+        message, found = playback.seek(t_s)[-1][9:], {}
+        while message:
+            size = int.from_bytes(message[1:3], "big")
+            found[layouts[message[0]]["channel"]] = message[3 : 3 + size]
+            message = message[3 + size :]
+        for channel, other in frames.WHAT_IF.items():
+            assert found[channel][:16] == found[other][:16]  # tick and time
+            i = int(np.searchsorted(then["tick"], int.from_bytes(found[names.STATE][8:16], "big")))
+        shown = then[i : i + 1]
+        assert found["WHAT_IF_STATE"] == shown.astype(shown.dtype.newbyteorder(">")).tobytes()
 
 
 def test_playback_finds_its_moment(known_log):

@@ -4,6 +4,7 @@ import math
 import os
 import shutil
 import signal
+import subprocess
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -220,6 +221,33 @@ def test_records_and_plays_back(page, cockpit, logs):
     page.click("#play")
     page.click("#close-log")
     until(lambda: shown(page, "cockpit.newest?.kind") == frames.LIVE, "the live robot is back")
+
+
+def test_a_log_is_filtered_again_beside_what_was(page, cockpit, root, logs):
+    run = [root / "build/host/equipoise", "run", "--backend", "sim", "--config", root / "config/mbbr.toml"]
+    run += ["--telemetry", "off", "--speed", "50", "--arm", "--duration-s", "6", "--log", logs / "died.lcm"]
+    subprocess.run([*map(str, run), "--fault", "encoder_dead@3"], capture_output=True, check=True)
+    page.goto(cockpit.link)
+    page.focus("#logs")
+    page.wait_for_selector("#logs option[value='died.lcm']", state="attached")
+    page.select_option("#logs", "died.lcm")
+    page.wait_for_selector("#player:visible")
+    page.evaluate("s = document.getElementById('slider'); s.value = 5; s.dispatchEvent(new Event('input'))")
+    assert "what if" not in text(page, "#plots")
+    page.fill("#changes", "safety.detecton=false")
+    page.click("#filter-again")
+    until(lambda: "did you mean safety.detection" in text(page, "#message"), "a slip is named")
+    page.wait_for_selector("#filter-again:enabled")
+    page.fill("#changes", "safety.detection=false")
+    page.click("#filter-again")
+    page.wait_for_selector("#what-if:visible")
+    alarms = page.locator("#what-if tr", has_text="alarms").locator("td").all_inner_texts()
+    assert "without wheel" in alarms[1] and "without wheel" not in alarms[2]
+    assert "what if" in text(page, "#plots")
+    until(lambda: shown(page, "cockpit.newest?.WHAT_IF_STATE?.utime > 4.9e6"), "its curve at that moment")
+    page.click("#close-log")
+    until(lambda: not page.locator("#what-if").is_visible(), "it goes with the log")
+    until(lambda: "what if" not in text(page, "#plots"), "and its curves")
 
 
 def test_parameters_have_a_range_and_change_in_simulation(page, cockpit):

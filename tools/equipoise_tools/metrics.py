@@ -49,6 +49,7 @@ class Summary:
     battery_V: tuple[float, float] | None = None  # lowest, mean
     estimators: dict[str, Errors] = field(default_factory=dict)
     events: list[tuple[float, str]] = field(default_factory=list)
+    tilt_rms_rad: float | None = None  # of the estimate, while armed
     nis_mean: float | None = None  # while armed; 1 when the noise is as the filter believes
     alarms: list[tuple[float, str, int]] | None = None  # first, what, ticks
 
@@ -240,6 +241,38 @@ def outcome(summary: Summary) -> str:
     return f"disarmed at the end{why}" if summary.armed_s else f"disarmed all the time{why}"
 
 
+def number_rows(summary: Summary) -> list[tuple[str, str]]:
+    """What the page's first table and the terminal say."""
+    rows = [
+        ("outcome", outcome(summary)),
+        ("duration", f"{summary.duration_s:.2f} s, {summary.ticks} ticks, armed {summary.armed_s:.2f} s"),
+    ]
+    if summary.yaw_rate_mean_hz is not None:
+        rows.append(("mean yaw rate", f"{summary.yaw_rate_mean_hz:.3f} Hz"))
+    if summary.position_rmse_m is not None:
+        rows.append(("position error, RMS", f"{100 * summary.position_rmse_m:.2f} cm"))
+    if summary.duty_max is not None:
+        rows.append(("largest duty", f"{summary.duty_max:.3f}"))
+        rows.append(("ticks with a saturated motor", f"{100 * summary.saturated_fraction:.2f} %"))
+    if summary.tilt_rms_rad is not None:
+        rows.append(("tilt, RMS while armed", f"{np.degrees(summary.tilt_rms_rad):.3f} deg"))
+    if summary.nis_mean is not None:
+        rows.append(("normalised innovation, mean while armed", f"{summary.nis_mean:.3f}"))
+    if summary.alarms is not None:
+        said = "; ".join(f"{what} from {t_s:.2f} s, {ticks} ticks" for t_s, what, ticks in summary.alarms)
+        rows.append(("alarms", said or "none"))
+    if summary.battery_V is not None:
+        rows.append(
+            ("battery, lowest and mean", f"{summary.battery_V[0]:.2f} V, {summary.battery_V[1]:.2f} V")
+        )
+    if summary.compute_us is not None:
+        rows.append(
+            ("tick, median / 99 % / longest", " / ".join(f"{us:.1f}" for us in summary.compute_us) + " µs")
+        )
+        rows.append(("overruns, records lost", f"{summary.overruns}, {summary.dropped_records}"))
+    return rows
+
+
 def check_time(log: Log) -> None:
     """Of a log that nobody vouches for."""
     for channel in log:
@@ -303,5 +336,8 @@ def summarise(log: Log) -> Summary:
     if names.HEALTH in log and names.STATE in log:
         state, health = aligned(log, names.STATE, names.HEALTH)
         armed = health["arm_state"] == names.ARM_STATES.index("armed")
-        summary.nis_mean = float(state["normalized_innovation"][armed].mean()) if armed.any() else None
+        if armed.any():
+            tilt = state["theta_rad"][armed][:, : tilt_axes(log)]
+            summary.tilt_rms_rad = rms(np.linalg.norm(tilt, axis=1))
+            summary.nis_mean = float(state["normalized_innovation"][armed].mean())
     return summary

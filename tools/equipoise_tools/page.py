@@ -9,7 +9,7 @@ from html import escape
 from equipoise_robot.log import Log
 
 from .interactive import Run, fragment
-from .metrics import Summary, outcome, run_record
+from .metrics import Summary, number_rows, run_record
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1200px; margin: 2rem auto; }
@@ -35,36 +35,6 @@ def _table(rows: list[tuple[str, ...]], head: tuple[str, ...] = ()) -> str:
         lines.append("<tr>" + "".join(f"<th>{escape(text)}</th>" for text in head) + "</tr>")
     lines += ["<tr>" + "".join(cell(i, text) for i, text in enumerate(row)) + "</tr>" for row in rows]
     return "\n".join([*lines, "</table>"])
-
-
-def number_rows(summary: Summary) -> list[tuple[str, str]]:
-    """What the page's first table and the terminal say."""
-    rows = [
-        ("outcome", outcome(summary)),
-        ("duration", f"{summary.duration_s:.2f} s, {summary.ticks} ticks, armed {summary.armed_s:.2f} s"),
-    ]
-    if summary.yaw_rate_mean_hz is not None:
-        rows.append(("mean yaw rate", f"{summary.yaw_rate_mean_hz:.3f} Hz"))
-    if summary.position_rmse_m is not None:
-        rows.append(("position error, RMS", f"{100 * summary.position_rmse_m:.2f} cm"))
-    if summary.duty_max is not None:
-        rows.append(("largest duty", f"{summary.duty_max:.3f}"))
-        rows.append(("ticks with a saturated motor", f"{100 * summary.saturated_fraction:.2f} %"))
-    if summary.nis_mean is not None:
-        rows.append(("normalised innovation, mean while armed", f"{summary.nis_mean:.3f}"))
-    if summary.alarms is not None:
-        said = "; ".join(f"{what} from {t_s:.2f} s, {ticks} ticks" for t_s, what, ticks in summary.alarms)
-        rows.append(("alarms", said or "none"))
-    if summary.battery_V is not None:
-        rows.append(
-            ("battery, lowest and mean", f"{summary.battery_V[0]:.2f} V, {summary.battery_V[1]:.2f} V")
-        )
-    if summary.compute_us is not None:
-        rows.append(
-            ("tick, median / 99 % / longest", " / ".join(f"{us:.1f}" for us in summary.compute_us) + " µs")
-        )
-        rows.append(("overruns, records lost", f"{summary.overruns}, {summary.dropped_records}"))
-    return rows
 
 
 def estimator_rows(summary: Summary) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,17 +12,18 @@ from equipoise_robot.log import Log, read_log
 from .entry import leave
 from .figures import draw_report, headline
 from .interactive import UPLOT, Run
-from .metrics import Summary, summarise
-from .page import comparison, estimator_rows, number_rows, page
-from .paths import UserError, binary
+from .metrics import Summary, number_rows, summarise
+from .page import comparison, estimator_rows, page
+from .paths import UserError
 from .style import plt
+from .what_if import NOTE, what_if
 
 
 def print_numbers(log: Log, summary: Summary) -> None:
     for note in log.notes:
         print(f"note: {note}")
     for what, value in number_rows(summary):
-        print(f"{what + ':':<32}{value}")
+        print(f"{what + ':':<31} {value}")
     if summary.estimators:
         head, rows = estimator_rows(summary)
         for row in (head, *rows):
@@ -36,27 +36,6 @@ def picture_of(run: Run) -> bytes:
     figure.savefig(picture, format="png")
     plt.close(figure)
     return picture.getvalue()
-
-
-WHAT_IF = (
-    "The second column is no run: another tuning got the samples and commands of the first, and its filter "
-    "what that run did to the motors. Its duty is what it would have asked for in the states of the first."
-)
-
-
-def what_if(log: Path, changes: list[str], out: Path) -> Path:
-    """The log of `equipoise replay --set`, in the folder."""
-    changed = out / "what-if.lcm"
-    out.mkdir(parents=True, exist_ok=True)
-    command = [binary(), "replay", log, "--log", changed, "--json", "/dev/null"]
-    for change in changes:
-        command += ["--set", change]
-    ran = subprocess.run(command, capture_output=True, text=True, check=False)
-    if ran.returncode > 1:
-        raise UserError(ran.stderr.strip().removeprefix("equipoise: "))
-    if ran.returncode == 1:
-        print("note: this version's pipeline differs from the recorded one's; equipoise replay says where")
-    return changed
 
 
 def write_report(runs: list[Run], out: Path, note: str = "") -> list[Path]:
@@ -110,11 +89,14 @@ def main(arguments: list[str] | None = None) -> int:
             raise UserError("--set: takes one log")
         shown = names_of(options.logs)
         if options.set:
-            options.logs.append(what_if(options.logs[0], options.set, out))
+            changed, note = what_if(options.logs[0], options.set, out)
+            if note:
+                print(f"note: {note}")
+            options.logs.append(changed)
             shown.append(", ".join(options.set))
         logs = [read_log(path) for path in options.logs]
         runs = [Run(name, log, summarise(log)) for name, log in zip(shown, logs, strict=True)]
-        written = write_report(runs, out, WHAT_IF if options.set else "")
+        written = write_report(runs, out, NOTE if options.set else "")
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

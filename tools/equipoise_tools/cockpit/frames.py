@@ -25,8 +25,11 @@ CHANNELS = {
     names.TIMING_HISTOGRAM: "timing_histogram_t",
     names.FAULTS: "faults_t",
     names.HEALTH: "health_t",
+    "WHAT_IF_STATE": "state_t",
+    "WHAT_IF_FAULTS": "faults_t",
     names.TIMING: "timing_t",
 }
+WHAT_IF = {names.STATE: "WHAT_IF_STATE", names.FAULTS: "WHAT_IF_FAULTS"}  # of another tuning, beside a log's
 _INDEX = {channel: index for index, channel in enumerate(CHANNELS)}
 _HEAD = struct.Struct(">Bd")
 _PART = struct.Struct(">BH")

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from equipoise_robot.log import Log, read_log
 
 from .. import names
-from ..metrics import outcome, robot_of, safety_events, summarise
+from ..metrics import number_rows, outcome, robot_of, safety_events, summarise
 from ..paths import UserError
-from .frames import CHANNELS, HISTORY, PLAYED, pack
+from ..what_if import NOTE, what_if
+from .frames import CHANNELS, HISTORY, PLAYED, WHAT_IF, pack
 
 HISTORY_S = 30.0
 HISTORY_FRAMES = 1500
@@ -30,6 +32,22 @@ class Playback:
         self.rate = 1.0
         self.playing = False
         self._shown = -1
+        self.beside: Playback | None = None  # what another tuning would have made of it
+
+    def filter_again(self, changes: list[str]) -> dict:
+        """Shows another tuning beside the run from now on; the numbers of both."""
+        with TemporaryDirectory(prefix="equipoise-what-if-") as folder:
+            path, note = what_if(self.log.path, changes, Path(folder))
+            beside = Playback(path)
+        was, then = (dict(number_rows(summarise(playback.log))) for playback in (self, beside))
+        self.beside = beside
+        return {
+            "set": changes,
+            "rows": [
+                [what, was.get(what, "-"), then.get(what, "-")] for what in dict.fromkeys([*was, *then])
+            ],
+            "note": " ".join([NOTE, note]).strip(),
+        }
 
     def describe(self) -> dict:
         summary = summarise(self.log)
@@ -75,11 +93,16 @@ class Playback:
 
     def _frame(self, i: int, kind: int) -> bytes:
         tick = self._ticks[names.STATE][i]
-        messages = {}
-        for channel in self.channels:
-            j = int(np.searchsorted(self._ticks[channel], tick, side="right")) - 1
-            if j < 0 or (channel != names.TIMING_HISTOGRAM and self._ticks[channel][j] != tick):
-                continue
-            record = self.log[channel][j : j + 1]
-            messages[channel] = record.astype(record.dtype.newbyteorder(">")).tobytes()
-        return pack(kind, 0.0, messages)
+        messages = {channel: self._message(channel, tick) for channel in self.channels}
+        if self.beside is not None:
+            for channel in set(WHAT_IF) & set(self.beside.channels):
+                messages[WHAT_IF[channel]] = self.beside._message(channel, tick)
+        return pack(kind, 0.0, {channel: body for channel, body in messages.items() if body})
+
+    def _message(self, channel: str, tick: int) -> bytes:
+        """Of that tick, of a histogram the newest until then; empty: there is none."""
+        j = int(np.searchsorted(self._ticks[channel], tick, side="right")) - 1
+        if j < 0 or (channel != names.TIMING_HISTOGRAM and self._ticks[channel][j] != tick):
+            return b""
+        record = self.log[channel][j : j + 1]
+        return record.astype(record.dtype.newbyteorder(">")).tobytes()

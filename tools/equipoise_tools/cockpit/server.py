@@ -27,6 +27,7 @@ MODULES = repository_root() / "build/page/node_modules"
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 QUEUE = 64  # frames that may wait for one page; a slower page misses some
 MAX_REQUEST = 4096  # bytes
+SETTING = re.compile(r"[a-z]\w*(\.\w+)+\s*=")  # of a key in a table: no include, no other option
 LIBRARIES = {
     "three.module.js": "three/build/three.module.js",
     "three.core.js": "three/build/three.core.js",
@@ -70,6 +71,7 @@ class Page(tornado.websocket.WebSocketHandler):
         self._ready = asyncio.Event()
         self._sender: asyncio.Task | None = None
         self._player: asyncio.Task | None = None
+        self._filtering: asyncio.Task | None = None
 
     def check_origin(self, origin: str) -> bool:
         """Only our own page, whatever name another one gives this address."""
@@ -245,19 +247,41 @@ class Page(tornado.websocket.WebSocketHandler):
             self.tell(playback=None)
         elif self.playback is None:
             raise UserError(
-                f"{do}: no log is open" if do in ("play", "pause", "seek") else f"{do}: not understood"
+                f"{do}: no log is open" if do in ("play", "pause", "seek", "what-if") else f"{do}: not understood"
             )
         elif do == "play":
             self.playback.rate = min(max(number(request.get("rate", 1.0), MAX_RATE), 0.1), MAX_RATE)
             self.playback.playing = True
         elif do == "pause":
             self.playback.playing = False
+        elif do == "what-if":
+            changes = [change.strip() for change in str(request["changes"]).split(";") if change.strip()]
+            for change in changes:
+                if not SETTING.match(change):
+                    raise UserError(f"{change}: expected table.key=value, separated by ;")
+            if self._filtering is not None and not self._filtering.done():
+                raise UserError("what-if: the last one is still being filtered")
+            # In a task of its own: a disarm does not wait for it.
+            self._filtering = asyncio.create_task(self._filter_again(self.playback, changes))
         elif do == "seek":
             self._show(self.playback.seek(number(request["t_s"], 1e9)))
         else:
             raise UserError(f"{do}: not understood")
         if self.playback is not None:
             self.tell(play=self.playback.state())
+
+    async def _filter_again(self, playback: Playback, changes: list[str]) -> None:
+        try:
+            told = None
+            if changes:
+                told = await asyncio.to_thread(playback.filter_again, changes)
+            else:
+                playback.beside = None
+            if self.playback is playback:
+                self.tell(what_if=told)
+                self._show(playback.seek(playback.t_s))
+        except (UserError, OSError) as error:
+            self.tell(error=str(error))
 
     def _show(self, history: list[bytes]) -> None:
         """One message, however many frames: it counts as one in the queue."""
@@ -287,7 +311,7 @@ class Page(tornado.websocket.WebSocketHandler):
     def on_close(self) -> None:
         self.cockpit.pages.discard(self)
         self._release()
-        for task in (self._sender, self._player):
+        for task in (self._sender, self._player, self._filtering):
             if task is not None:
                 task.cancel()
 

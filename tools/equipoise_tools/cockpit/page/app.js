@@ -66,6 +66,8 @@ function heard(event) {
   if (event.parameters) showParameters(event.parameters);
   if (event.status) { status = event.status; showStatus(); }
   if (event.error) message(event.error);
+  if (event.error) $("filter-again").disabled = false;
+  if ("what_if" in event) showWhatIf(event.what_if);
   if (event.logs) showLogs(event.logs);
   if ("playback" in event) showPlayback(event.playback);
   if (event.play) showPlay(event.play);
@@ -195,6 +197,7 @@ function showLogs(logs) {
 function showPlayback(described) {
   playback = described;
   $("player").hidden = !described;
+  showWhatIf(null);
   plots.history.clear();
   scene.forget();
   shownEvent = "";
@@ -209,6 +212,23 @@ function showPlayback(described) {
   }
   plots.pause(false);
   showStatus();
+}
+
+/** Numbers of the run and of another tuning; the plots get a curve of it. */
+function showWhatIf(told) {
+  $("filter-again").disabled = false;
+  $("what-if").hidden = !told;
+  $("what-if").querySelector("p").textContent = told ? `${told.set.join("; ")}. ${told.note}` : "";
+  $("what-if").querySelector("tbody").replaceChildren(...(told?.rows ?? []).map((row) => {
+    const tr = document.createElement("tr");
+    tr.append(...row.map((text) => { const td = document.createElement("td"); td.textContent = text; return td; }));
+    tr.classList.toggle("changed", row[1] !== row[2]);
+    return tr;
+  }));
+  if (plots.beside === Boolean(told)) return;
+  plots.beside = Boolean(told);
+  plots.robot = null;
+  plots.build(robot);
 }
 
 function showPlay(state) {
@@ -321,6 +341,7 @@ $("logs").onchange = (event) => { if (event.target.value) say({ do: "open", log:
 $("play").onclick = () => say({ do: play?.playing ? "pause" : "play", rate: Number($("rate").value) });
 $("rate").onchange = () => { if (play?.playing) say({ do: "play", rate: Number($("rate").value) }); };
 $("slider").oninput = (event) => { plots.history.clear(); scene.forget(); say({ do: "seek", t_s: Number(event.target.value) }); };
+$("filter-again").onclick = () => { $("filter-again").disabled = true; say({ do: "what-if", changes: $("changes").value }); };
 $("close-log").onclick = () => say({ do: "close" });
 for (const [id, unit] of [["max-speed", "m/s"], ["max-yaw", "turns/s"]]) {
   const show = () => { $(id).nextElementSibling.textContent = `${$(id).value} ${unit}`; };

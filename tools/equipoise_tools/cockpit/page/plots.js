@@ -29,7 +29,8 @@ export class History {
 }
 
 const SIGNALS = { t: 0, tiltX: 1, tiltY: 2, refX: 3, refY: 4, speedX: 5, speedY: 6, refSpeedX: 7, refSpeedY: 8,
-  yaw: 9, wantedYaw: 10, duty0: 11, duty1: 12, duty2: 13, duty3: 14, battery: 15, nis: 16, ratio: 17, runnerUp: 18, bound: 19 };
+  yaw: 9, wantedYaw: 10, duty0: 11, duty1: 12, duty2: 13, duty3: 14, battery: 15, nis: 16, ratio: 17, runnerUp: 18, bound: 19,
+  thenX: 20, thenY: 21, thenNis: 22, thenRatio: 23 };
 
 /** cm/s, forward and to the left of the nose: a ball that rolls about y goes along x. */
 const speeds = { mbbr: (s, radius) => [100 * radius * s.phi_dot_rad_s[1], -100 * radius * s.phi_dot_rad_s[0]],
@@ -37,32 +38,36 @@ const speeds = { mbbr: (s, radius) => [100 * radius * s.phi_dot_rad_s[1], -100 *
 
 function row(frame, robot, radius) {
   const s = frame.EQUIPOISE_STATE, r = frame.EQUIPOISE_REFERENCE, m = frame.EQUIPOISE_MOTORS;
-  const c = frame.EQUIPOISE_COMMAND, h = frame.EQUIPOISE_HEALTH, f = frame.EQUIPOISE_FAULTS;
+  const c = frame.EQUIPOISE_COMMAND, h = frame.EQUIPOISE_HEALTH, f = frame.EQUIPOISE_FAULTS, w = frame.WHAT_IF_STATE;
   const state = (x, f) => (x ? f(x) : NaN);
   const speed = (x) => (x ? (speeds[robot] ?? speeds.mbbr)(x, radius) : [NaN, NaN]);
   return [s.utime * 1e-6, deg(s.theta_rad[0]), deg(s.theta_rad[1]), state(r, (x) => deg(x.theta_rad[0])),
     state(r, (x) => deg(x.theta_rad[1])), ...speed(s), ...speed(r),
     turns(s.omega_B_rad_s[2]), state(c, (x) => turns(x.yaw_rate_rad_s)),
     ...[0, 1, 2, 3].map((i) => (m && i < m.motors ? m.duty[i] : NaN)), h ? h.battery_V : NaN, s.normalized_innovation,
-    ...(f ? [f.ratio, f.runner_up_ratio, f.bound] : [NaN, NaN, NaN])];
+    ...(f ? [f.ratio, f.runner_up_ratio, f.bound] : [NaN, NaN, NaN]),
+    state(w, (x) => deg(x.theta_rad[0])), state(w, (x) => deg(x.theta_rad[1])), state(w, (x) => x.normalized_innovation),
+    frame.WHAT_IF_FAULTS ? frame.WHAT_IF_FAULTS.ratio : NaN];
 }
 
-const FAULTS = ["Fault evidence, log-likelihood ratio (nats)", ["ratio", "leading", "blue"], ["runnerUp", "runner-up", "green"], ["bound", "bound", "red", [4, 3]]];
+const FAULTS = ["Fault evidence, log-likelihood ratio (nats)", ["ratio", "leading", "blue"], ["runnerUp", "runner-up", "green"], ["bound", "bound", "red", [4, 3]],
+  ["thenRatio", "what if", "pink", [2, 2]]];
 const PANELS = {
   mbbr: [
-    ["Tilt (deg)", ["tiltX", "about x", "blue"], ["tiltY", "about y", "green"], ["refX", "wanted x", "red", [4, 3]], ["refY", "wanted y", "yellow", [4, 3]]],
+    ["Tilt (deg)", ["tiltX", "about x", "blue"], ["tiltY", "about y", "green"], ["refX", "wanted x", "red", [4, 3]], ["refY", "wanted y", "yellow", [4, 3]],
+      ["thenX", "what if x", "pink", [2, 2]], ["thenY", "what if y", "black", [2, 2]]],
     ["Speed, as the nose points (cm/s)", ["speedX", "forward", "blue"], ["speedY", "left", "green"], ["refSpeedX", "wanted forward", "red", [4, 3]], ["refSpeedY", "wanted left", "yellow", [4, 3]]],
     ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "asked for", "red", [4, 3]]],
     ["Duty", ["duty0", "motor 1", "blue"], ["duty1", "motor 2", "green"], ["duty2", "motor 3", "pink"]],
-    ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"]],
+    ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"], ["thenNis", "what if", "pink", [2, 2]]],
     FAULTS,
   ],
   mip: [
-    ["Lean (deg)", ["tiltX", "lean", "blue"], ["refX", "wanted", "red", [4, 3]]],
+    ["Lean (deg)", ["tiltX", "lean", "blue"], ["refX", "wanted", "red", [4, 3]], ["thenX", "what if", "pink", [2, 2]]],
     ["Wheel speed (cm/s)", ["speedX", "measured", "blue"], ["refSpeedX", "wanted", "red", [4, 3]]],
     ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "asked for", "red", [4, 3]]],
     ["Duty", ["duty0", "motor 1", "blue"], ["duty1", "motor 2", "green"]],
-    ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"]],
+    ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"], ["thenNis", "what if", "pink", [2, 2]]],
     FAULTS,
   ],
 };
@@ -72,6 +77,7 @@ export class Plots {
     this.element = element;
     this.history = new History(Object.keys(SIGNALS).length);
     this.paused = false;
+    this.beside = false; // another tuning's curves are drawn
     this.onpause = () => {};
     this.plots = [];
     new ResizeObserver(() => this.plots.forEach((p) => p.plot.setSize(this.size()))).observe(element);
@@ -84,7 +90,9 @@ export class Plots {
     this.robot = robot;
     this.plots.forEach((p) => p.plot.destroy());
     this.history.clear();
-    this.plots = (PANELS[robot] ?? PANELS.mbbr).map(([title, ...series]) => {
+    this.plots = (PANELS[robot] ?? PANELS.mbbr).map(([title, ...all]) => {
+      // Beside another tuning the battery makes room for the NIS of both.
+      const series = all.filter(([signal]) => (this.beside ? signal !== "battery" : !signal.startsWith("then")));
       const columns = [SIGNALS.t, ...series.map(([signal]) => SIGNALS[signal])];
       const style = getComputedStyle(document.body).color;
       const axis = { stroke: style, grid: { stroke: "#8883", width: 1 }, ticks: { stroke: "#8883" }, font: "11px system-ui" };
