@@ -70,8 +70,8 @@ class Body:
     total: Properties
 
 
-def solids(robot: str, d: dict[str, Any], bought: dict[str, Bought]) -> list[Part]:
-    return {"mbbr": mbbr, "mip": mip}[robot](d, {name: part.size_m for name, part in bought.items()})
+def solids(robot: str, d: dict[str, Any], bought: dict[str, Bought], plain: bool = False) -> list[Part]:
+    return {"mbbr": mbbr, "mip": mip}[robot](d, {name: part.size_m for name, part in bought.items()}, plain)
 
 
 def assemble(
@@ -157,7 +157,7 @@ def looks(body: Body) -> Solid:
     """One coarse solid for models to show; the omniwheels turn by themselves."""
     m3.set_circular_segments(COARSE)
     try:
-        parts = solids("mbbr" if is_mbbr(body) else "mip", body.dimensions, body.bought)
+        parts = solids("mbbr" if is_mbbr(body) else "mip", body.dimensions, body.bought, plain=True)
     finally:
         m3.set_circular_segments(SEGMENTS)
     return together([part.solid for part in parts if part.name != "omniwheel"])

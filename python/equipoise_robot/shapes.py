@@ -106,8 +106,11 @@ def supports(d: dict[str, Any]) -> list[NDArray[np.float64]]:
     return [np.array([np.cos(a) * np.cos(down), np.sin(a) * np.cos(down), -np.sin(down)]) for a in around]
 
 
-def mbbr(d: dict[str, Any], sizes: dict[str, tuple[float, ...]]) -> list[Part]:
-    """A cage that holds the ball and clamps the motors, which stand along their wheels' axes; a tower."""
+def mbbr(d: dict[str, Any], sizes: dict[str, tuple[float, ...]], plain: bool) -> list[Part]:
+    """A cage that holds the ball and clamps the motors, which stand along their wheels' axes; a tower.
+
+    plain: without holes, to look at.
+    """
     r, r_w = d["ball_radius_m"], d["wheel_radius_m"]
     motor_d, motor_l = sizes["motor"]
     axes = [np.array(axis) * np.sign(axis[2] or 1.0) for axis in d["wheel_axes"]]
@@ -159,7 +162,7 @@ def mbbr(d: dict[str, Any], sizes: dict[str, tuple[float, ...]]) -> list[Part]:
         azimuth = np.pi / 2 + i * 2 * np.pi / 3
         at = columns * np.array([np.cos(azimuth), np.sin(azimuth)])
         posts.append(rod(2 * POST, (*at, deck), (*at, lid + PLATE)))
-    cut = together([*room, *pockets, drivers, board, battery])
+    cut = m3.Manifold() if plain else together([*room, *pockets, drivers, board, battery])
     return [
         Part("cage", whole(cage - cut), printed=True),
         Part(
@@ -178,7 +181,7 @@ def mbbr(d: dict[str, Any], sizes: dict[str, tuple[float, ...]]) -> list[Part]:
 # --- The eduMIP ---
 
 
-def mip(d: dict[str, Any], sizes: dict[str, tuple[float, ...]]) -> list[Part]:
+def mip(d: dict[str, Any], sizes: dict[str, tuple[float, ...]], plain: bool) -> list[Part]:
     """A bracket around the motors, a plate with the board behind it; a tray whose battery weighs it up."""
     motor_d, motor_l = sizes["motor"]
     board, battery = np.array(sizes["board"]), np.array(sizes["battery"])
@@ -195,7 +198,7 @@ def mip(d: dict[str, Any], sizes: dict[str, tuple[float, ...]]) -> list[Part]:
     front = before - battery[1] / 2 - WALL
     tray = box((battery[0], face - front, PLATE), (0, (face + front) / 2, low - PLATE / 2))
     lip = box((battery[0], WALL, 2 * low), (0, front + WALL / 2, low))
-    room = together([*motors, box(board, at), box(battery, shelf)])
+    room = m3.Manifold() if plain else together([*motors, box(board, at), box(battery, shelf)])
     return [
         Part("chassis", whole(together([plate, bracket, tray, lip]) - room), printed=True),
         *(Part("motor", motor) for motor in motors),

@@ -246,9 +246,8 @@ class Page(tornado.websocket.WebSocketHandler):
             self.playback = None
             self.tell(playback=None)
         elif self.playback is None:
-            raise UserError(
-                f"{do}: no log is open" if do in ("play", "pause", "seek", "what-if") else f"{do}: not understood"
-            )
+            known = do in ("play", "pause", "seek", "what-if")
+            raise UserError(f"{do}: no log is open" if known else f"{do}: not understood")
         elif do == "play":
             self.playback.rate = min(max(number(request.get("rate", 1.0), MAX_RATE), 0.1), MAX_RATE)
             self.playback.playing = True
