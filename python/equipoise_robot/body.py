@@ -87,9 +87,15 @@ def assemble(
         if name not in bought:
             raise UserError(f"{name}: no part of this robot; they are {', '.join(bought)}")
     for name, size in (sizes or {}).items():
+        if len(size) != len(bought[name].size_m) or not all(0.0 < edge < 1.0 for edge in size):
+            raise UserError(f"size of {name}: {len(bought[name].size_m)} lengths in metres, above 0, below 1")
         bought[name] = replace(bought[name], size_m=size)
     for name, mass_kg in (masses or {}).items():
+        if not 0.0 < mass_kg < 100.0:
+            raise UserError(f"mass of {name}: {mass_kg:g} kg is out of range, 0 to 100")
         bought[name] = replace(bought[name], mass_kg=mass_kg)
+    if not 0.0 < density_kg_m3 < 25e3:
+        raise UserError(f"density: {density_kg_m3:g} kg/m3 is out of range, 0 to 25000")
     parts = solids(kind, d, bought)
     ball = [Part("ball", sphere(d["ball_radius_m"]))] if kind == "mbbr" else []
     for a, b in itertools.combinations(parts + ball, 2):
@@ -188,6 +194,13 @@ def pair(text: str) -> tuple[str, str]:
     return name, value
 
 
+def number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UserError(f"{text}: expected a number") from None
+
+
 def main(arguments: list[str] | None = None) -> int:
     about = (__doc__ or "").splitlines()[0]
     parser = argparse.ArgumentParser(prog="python -m equipoise_robot.body", description=about)
@@ -211,12 +224,12 @@ def main(arguments: list[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     try:
-        sizes = {name: tuple(map(float, value.split(","))) for name, value in options.size}
-        masses = {name: float(value) for name, value in options.mass}
+        sizes = {name: tuple(number(n) for n in value.split(",")) for name, value in options.size}
+        masses = {name: number(value) for name, value in options.mass}
         body = assemble(options.robot, sizes, masses, options.density)
         for path in export(body, options.out) if options.out else []:
             print(path, file=sys.stderr)
-    except (UserError, ValueError) as error:
+    except (UserError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     print(fragment(body), end="")

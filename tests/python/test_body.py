@@ -156,6 +156,11 @@ def test_the_keys_are_a_configuration_that_stands_and_says_the_difference(root, 
     ("asked", "said"),
     [
         ({"masses": {"moter": 0.1}}, "moter: no part of this robot; they are motor"),
+        ({"masses": {"motor": -1.0}}, "mass of motor: -1 kg is out of range"),
+        ({"masses": {"motor": float("nan")}}, "mass of motor: nan kg is out of range"),
+        ({"density_kg_m3": 0.0}, "density: 0 kg/m3 is out of range"),
+        ({"sizes": {"motor": (0.025,)}}, "size of motor: 2 lengths in metres"),
+        ({"sizes": {"board": (0.05, 0.02, 0.0)}}, "size of board: 3 lengths in metres, above 0"),
         ({"masses": {"battery": 0.6}}, "leaves nothing for what is not weighed"),
         (
             {"sizes": {"drivers": (0.075, 0.035, 0.03)}},
@@ -167,6 +172,13 @@ def test_the_keys_are_a_configuration_that_stands_and_says_the_difference(root, 
 def test_what_cannot_be_built_is_refused(asked, said):
     with pytest.raises(UserError, match=said):
         body.assemble("mbbr", **asked)
+
+
+@pytest.mark.parametrize("asked", ["--mass=motor=abc", "--out=/proc/none", "--size=motor=1;2"])
+def test_what_is_mistyped_is_named_in_a_line(asked, capsys):
+    assert body.main(["mip", asked]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: ") and said.count("\n") == 1
 
 
 def test_every_part_that_is_bought_says_where_its_numbers_are_from():
