@@ -1,4 +1,4 @@
-"""The command line of a converter: LOG and --out DIR."""
+"""The command line of a converter: LOG and --out PATH."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from .log import Log
 
 
 def convert(
-    to: str, about: str | None, write: Callable[[Log, Path], dict[str, int]], arguments: list[str] | None
+    to: str,
+    about: str | None,
+    write: Callable[[Log, Path], dict[str, int] | str],
+    arguments: list[str] | None,
 ) -> int:
     parser = argparse.ArgumentParser(prog=f"python -m equipoise_robot.{to}", description=about)
     parser.add_argument("log", metavar="LOG", type=Path, help="an LCM event log written by equipoise")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="folder to make (default: beside the log)")
+    parser.add_argument("--out", metavar="PATH", type=Path, help="what to make (default: beside the log)")
     given = parser.parse_args(arguments)
     out = given.out or given.log.with_suffix(f".{to}")
     there = out.exists()
@@ -34,5 +37,7 @@ def convert(
         return 2
     for note in log.notes:
         print(f"note: {note}")
-    print(f"{out}: {', '.join(f'{name} {count}' for name, count in counts.items() if count)}")
+    if not isinstance(counts, str):
+        counts = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+    print(f"{out}: {counts}")
     return 0

@@ -58,12 +58,12 @@ class Recorder {
   void put(Message, const char* name, const Record& record, const runtime::TickRecord& tick) {
     Channel& channel = channels_[name];
     const bool first = channel.columns.empty();
-    const auto field = [&](const char* column, const char*, const auto& value) {
+    const auto field = [&](const char* column, const auto& value) {
       if (first) channel.columns.push_back(described(column, value));
       channel.packed.append(reinterpret_cast<const char*>(&value), sizeof value);
     };
-    field("utime", "us", tick.now_ns / 1000);
-    field("tick", "", tick.tick);
+    field("utime", tick.now_ns / 1000);
+    field("tick", tick.tick);
     Message::visit(record, field);
   }
 

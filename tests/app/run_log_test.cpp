@@ -23,7 +23,7 @@ template <class Message, class Record>
 std::vector<std::string> listed(Message, Record record) {
   std::vector<std::string> out{"int64_t utime 1"};
   if (runtime::kHasTick<Message>) out.emplace_back("int64_t tick 1");
-  Message::visit(record, [&](const char* name, const char*, const auto& value) {
+  Message::visit(record, [&](const char* name, const auto& value) {
     const auto line = [&](auto element, std::size_t count) {
       using T = decltype(element);
       const char* type = std::is_same_v<T, bool>          ? "boolean"
@@ -65,7 +65,7 @@ void expect_same_layout(Message message, const Record& record) {
 struct Distinct {
   double next = 1.0;
   template <class T>
-  void operator()(const char*, const char*, T& value) {
+  void operator()(const char*, T& value) {
     if constexpr (std::is_same_v<T, std::string>) {
       value = "text " + std::to_string(next++);
     } else if constexpr (std::is_same_v<T, bool>) {
@@ -73,7 +73,7 @@ struct Distinct {
     } else if constexpr (std::is_arithmetic_v<T>) {
       value = static_cast<T>(sizeof(T) == 8 ? -1e15 * next++ : 1e6 * next++);
     } else {
-      for (auto& element : value) (*this)("", "", element);
+      for (auto& element : value) (*this)("", element);
     }
   }
 };
@@ -156,7 +156,7 @@ TEST(FieldList, IsWhatTheLcmTypesDeclare) {
 
 TEST(FieldList, HoldsEveryByteOfASampleAndOfAState) {
   std::size_t bytes = 0;
-  const auto add = [&bytes](const char*, const char*, const auto& value) { bytes += sizeof value; };
+  const auto add = [&bytes](const char*, const auto& value) { bytes += sizeof value; };
   const TickRecord tick{};
   fields::Sensors::visit(tick, add);
   EXPECT_EQ(bytes, sizeof(RawSample));

@@ -62,7 +62,7 @@ class Encoder {
   explicit Encoder(std::uint8_t* to) : to_(to) {}
 
   template <class T>
-  void operator()(const char*, const char*, const T& value) {
+  void operator()(const char*, const T& value) {
     put(value);
   }
   template <class T>
@@ -93,7 +93,7 @@ class Decoder {
   explicit Decoder(std::string_view bytes) : bytes_(bytes) {}
 
   template <class T>
-  void operator()(const char*, const char*, T& value) {
+  void operator()(const char*, T& value) {
     take(value);
   }
   template <class T>

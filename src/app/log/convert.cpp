@@ -2,7 +2,6 @@
 
 #include <cerrno>
 #include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -10,17 +9,14 @@
 #include <set>
 
 #include "app/cli/commands.hpp"
-#include "app/log/mcap_writer.hpp"
 #include "app/log/run_log.hpp"
 #include "app/text/files.hpp"
-#include "app/text/json.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 #include "equipoise/runtime/wire.hpp"
 
 namespace equipoise::app {
 namespace {
 
-using runtime::StateRecord;
 using runtime::TickRecord;
 namespace fields = runtime::fields;
 
@@ -40,29 +36,17 @@ constexpr auto text_of = [](auto value) -> std::string {
   }
 };
 
-struct Number {
-  std::string name;  // field, or field_0, field_1, ... of an array
-  const char* unit;
-  std::string text;
-  bool finite;
-};
-
-template <class Message, class Record>
-std::vector<Number> numbers_of(Message, const Record& record) {
-  std::vector<Number> numbers;
-  const auto add = [&](std::string name, const char* unit, auto value) {
-    numbers.push_back({std::move(name), unit, text_of(value), std::isfinite(static_cast<double>(value))});
-  };
-  Message::visit(record, [&](const char* name, const char* unit, const auto& value) {
+/// each(name, value) of every number of a message: its field, or field_0, field_1, ... of an array.
+constexpr auto each_number = [](auto message, const auto& record, auto&& each) {
+  decltype(message)::visit(record, [&](const std::string& name, const auto& value) {
     if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
-      add(name, unit, value);
+      each(name, value);
     } else {
       std::size_t i = 0;
-      for (const auto& element : value) add(std::string(name) + "_" + std::to_string(i++), unit, element);
+      for (const auto& element : value) each(name + "_" + std::to_string(i++), element);
     }
   });
-  return numbers;
-}
+};
 
 /// Which channels a log has, in alphabetical order.
 std::set<std::string, std::less<>> channels_of(const std::string& path) {
@@ -88,50 +72,49 @@ class CsvRows {
 
   std::string head() const {
     std::string line = "t_s,tick";
-    const auto add = [&line](const std::string& channel, const std::vector<Number>& numbers) {
-      for (const Number& n : numbers) line += "," + channel + "." + n.name;
+    const auto add = [&line](const std::string& channel, auto message, const auto& record) {
+      each_number(message, record,
+                  [&](const std::string& name, auto) { line += "," + channel + "." + name; });
     };
     const TickRecord none{};
     fields::each_message(none, [&](auto message, const char* channel, const auto& record) {
-      add(short_name(channel), numbers_of(message, record));
+      add(short_name(channel), message, record);
     });
-    if (has_truth_) add("truth", numbers_of(fields::State{}, none.truth));
-    if (has_faults_) add("faults", numbers_of(fields::Faults{}, none.faults));
+    if (has_truth_) add("truth", fields::State{}, none.truth);
+    if (has_faults_) add("faults", fields::Faults{}, none.faults);
     for (const std::string& estimator : estimators_)
-      add("state_" + estimator, numbers_of(fields::State{}, none.estimate));
+      add("state_" + estimator, fields::State{}, none.estimate);
     return line + "\n";
   }
 
   const std::string& row(const TickRecord& tick, const std::vector<std::string>& others) {
+    const auto cells = [this](auto message, const auto& record, bool has) {
+      each_number(message, record, [&](const std::string&, auto value) {
+        row_ += ',';
+        if (has) row_ += text_of(value);
+      });
+    };
     row_.clear();
     char time[32];
     std::snprintf(time, sizeof time, "%.6f", static_cast<double>(tick.now_ns) * 1e-9);
     row_ += time;
     row_ += ',';
     row_ += text_of(tick.tick);
-    fields::each_message(tick, [&](auto message, const char*, const auto& record) {
-      cells(numbers_of(message, record), true);
-    });
-    if (has_truth_) cells(numbers_of(fields::State{}, tick.truth), tick.has_truth);
-    if (has_faults_) cells(numbers_of(fields::Faults{}, tick.faults), tick.faults.bound > 0.0);
+    fields::each_message(
+        tick, [&](auto message, const char*, const auto& record) { cells(message, record, true); });
+    if (has_truth_) cells(fields::State{}, tick.truth, tick.has_truth);
+    if (has_faults_) cells(fields::Faults{}, tick.faults, tick.faults.bound > 0.0);
     for (const std::string& estimator : estimators_) {
       const auto found = std::find(others.begin(), others.end(), estimator);
       const auto i = static_cast<std::size_t>(found - others.begin());
       const bool has = found != others.end() && (tick.compared & (1U << i)) != 0;
-      cells(numbers_of(fields::State{}, tick.others[has ? i : 0]), has);
+      cells(fields::State{}, tick.others[has ? i : 0], has);
     }
     row_ += '\n';
     return row_;
   }
 
  private:
-  void cells(const std::vector<Number>& numbers, bool has) {
-    for (const Number& n : numbers) {
-      row_ += ',';
-      if (has) row_ += n.text;
-    }
-  }
-
   bool has_truth_ = false, has_faults_ = false;
   std::vector<std::string> estimators_;
   std::string row_;
@@ -144,88 +127,6 @@ std::int64_t write_csv(const std::string& path, std::ostream& out) {
   log.show_progress("convert");
   std::int64_t ticks = 0;
   for (TickRecord tick; log.next(&tick); ++ticks) out << rows.row(tick, log.estimators());
-  return ticks;
-}
-
-/// Every message of the log as JSON numbers: what Foxglove plots without a plug-in.
-class McapMessages {
- public:
-  explicit McapMessages(std::ostream& out) : mcap_(out) {}
-
-  void run(const runtime::RunInfo& run) {
-    std::map<std::string, std::string> entries;
-    fields::Run::visit(run, [&](const char* name, const char*, const auto& value) {
-      if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
-        entries[name] = text_of(value);
-      } else {
-        entries[name] = value;
-      }
-    });
-    mcap_.metadata("run", entries);
-  }
-
-  void event(const LogEvent& event) {
-    const bool state =
-        event.channel == fields::kTruthChannel || event.channel.rfind(fields::kComparedChannel, 0) == 0;
-    const auto take = [&](auto type, auto& record) {
-      std::int64_t utime = 0;
-      std::int64_t tick = 0;
-      if (runtime::decode(type, event.data, &record, &utime, &tick))
-        message(event, utime, tick, numbers_of(type, record));
-    };
-    if (state) take(fields::State{}, tick_.truth);
-    if (event.channel == fields::kFaultsChannel) take(fields::Faults{}, tick_.faults);
-    if (event.channel == fields::kHistogramChannel) take(fields::Histogram{}, histogram_);
-    if (event.channel == fields::kEndChannel) take(fields::End{}, end_);
-    fields::each_message(tick_, [&](auto type, std::string_view channel, auto& record) {
-      if (channel == event.channel) take(type, record);
-    });
-  }
-
-  void finish() { mcap_.finish(); }
-
- private:
-  void message(const LogEvent& event, std::int64_t utime, std::int64_t tick,
-               const std::vector<Number>& numbers) {
-    json_ = "{\"tick\":" + text_of(tick);
-    for (const Number& n : numbers)
-      json_ += ",\"" + n.name + "\":" + (n.finite ? n.text : "null");  // JSON knows no other word for it
-    json_ += '}';
-    mcap_.message(channel(event.channel, numbers), utime * 1000, json_);
-  }
-
-  std::uint16_t channel(std::string_view name, const std::vector<Number>& numbers) {
-    const auto known = channels_.find(name);
-    if (known != channels_.end()) return known->second;
-    nlohmann::json schema = {{"type", "object"}, {"properties", {{"tick", {{"type", "integer"}}}}}};
-    for (const Number& n : numbers) {
-      schema["properties"][n.name] = {{"type", "number"}};
-      if (*n.unit != '\0') schema["properties"][n.name]["description"] = n.unit;
-    }
-    const std::uint16_t id = mcap_.add_channel("equipoise/" + short_name(name), schema.dump());
-    channels_.emplace(name, id);
-    return id;
-  }
-
-  McapWriter mcap_;
-  std::map<std::string, std::uint16_t, std::less<>> channels_;
-  TickRecord tick_{};
-  fields::HistogramRecord histogram_{};
-  runtime::EndRecord end_;
-  std::string json_;
-};
-
-std::int64_t write_mcap(const std::string& path, std::ostream& out) {
-  McapMessages messages(out);
-  messages.run(RunLog(path).run());
-  LogReader reader = LogReader::open(path);
-  reader.show_progress("convert");
-  std::int64_t ticks = 0;
-  for (LogEvent event; reader.next(&event);) {
-    messages.event(event);
-    ticks += event.channel == fields::kSensorsChannel ? 1 : 0;
-  }
-  messages.finish();
   return ticks;
 }
 
@@ -263,8 +164,9 @@ int convert(ConvertArguments a) {
       throw InputError("--out " + a.out + ": is the log itself; choose another name");
   }
   check_output(a.out, {a.to == "csv" ? "t_s,tick" : "\x89MCAP"}, a.to);
+  if (a.to == "mcap") convert_in_python(a);
   std::ofstream file(a.out, std::ios::binary);
-  const std::int64_t ticks = a.to == "csv" ? write_csv(a.log, file) : write_mcap(a.log, file);
+  const std::int64_t ticks = write_csv(a.log, file);
   if (!file.flush()) throw InputError(a.out + ": cannot be written");
   std::printf("%s: %lld ticks\n", a.out.c_str(), static_cast<long long>(ticks));
   return 0;

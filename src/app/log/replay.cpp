@@ -37,7 +37,7 @@ std::vector<Computed> computed(const runtime::TickRecord& r, bool faults) {
     using Message = decltype(message);
     if constexpr (std::is_same_v<Message, fields::State> || std::is_same_v<Message, fields::Motors> ||
                   std::is_same_v<Message, fields::Health> || std::is_same_v<Message, fields::Faults>) {
-      Message::visit(record, [&](const char* field, const char*, const auto& value) {
+      Message::visit(record, [&](const char* field, const auto& value) {
         if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
           out.push_back({channel, field, -1, static_cast<double>(value)});
         } else {
