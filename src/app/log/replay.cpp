@@ -1,12 +1,9 @@
 #include "app/log/replay.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <exception>
 
-#include "app/log/replay.hpp"
 #include "app/text/errors.hpp"
 #include "equipoise/runtime/fields.hpp"
 #include "equipoise/runtime/loop.hpp"
@@ -52,66 +49,6 @@ std::vector<Computed> computed(const runtime::TickRecord& r, bool faults) {
   return out;
 }
 
-/// The log as a hardware boundary: its samples, one per tick; motor commands go nowhere.
-class LoggedIo {
- public:
-  explicit LoggedIo(RunLog& log) : log_(log) {}
-
-  int wait_tick(std::int64_t* now_ns) noexcept {
-    try {
-      if (!log_.next(&now_)) return -ESHUTDOWN;
-    } catch (...) {
-      failure_ = std::current_exception();
-      return -EIO;
-    }
-    *now_ns = now_.now_ns;
-    return 0;
-  }
-  /// Why the log could not be read on, if it could not.
-  void rethrow() const {
-    if (failure_) std::rethrow_exception(failure_);
-  }
-  RawSample read() noexcept { return now_.raw; }
-  int write(const MotorCommand& /*command*/) noexcept { return 0; }
-  int motors_off() noexcept { return 0; }
-
-  const runtime::TickRecord& now() const noexcept { return now_; }
-
- private:
-  RunLog& log_;
-  runtime::TickRecord now_{};
-  std::exception_ptr failure_;
-};
-
-/// The logged tick once more, for a firmware that follows the recorded run.
-class HandedOverIo {
- public:
-  explicit HandedOverIo(const runtime::TickRecord& now) : now_(now) {}
-
-  int wait_tick(std::int64_t* now_ns) noexcept {
-    *now_ns = now_.now_ns;
-    return 0;
-  }
-  RawSample read() noexcept { return now_.raw; }
-  int write(const MotorCommand& /*command*/) noexcept { return 0; }
-  int motors_off() noexcept { return 0; }
-
- private:
-  const runtime::TickRecord& now_;
-};
-
-/// What the runtime held against the motors, then.
-class LoggedSupervisor {
- public:
-  /// `now`: the tick that is replayed.
-  explicit LoggedSupervisor(const runtime::TickRecord& now) : now_(now) {}
-  std::uint32_t begin(std::int64_t /*now_ns*/, const RawSample& /*raw*/) noexcept { return now_.inhibit; }
-  void end(bool /*driven*/, int /*write_error*/) noexcept {}
-
- private:
-  const runtime::TickRecord& now_;
-};
-
 /// What another tuning would have done, as a log: `replay` is its backend, for it was no run.
 class ChangedLog {
  public:
@@ -143,44 +80,42 @@ class ChangedLog {
   VerdictJudge judge_;
 };
 
+/// The logged tick once more.
+runtime::TickRecord again(const runtime::TickRecord& tick, Firmware& firmware) {
+  if (tick.has_truth) firmware.observe_truth(tick.truth);
+  const LoggedTick logged{tick.now_ns, tick.raw, tick.inhibit};
+  const auto command = [&](std::int64_t, std::int64_t) { return command_of(tick); };
+  runtime::TickRecord record;
+  const auto keep = [&record](const auto&, const auto&, const auto&, const auto&, const auto& r) {
+    record = r;
+  };
+  runtime::LoopEnd end;
+  runtime::run_tick(logged, firmware, command, keep, logged, &end);
+  return record;
+}
+
 /// `follower`, where there is one: its record of the same tick into `retuned`, and into `changed`.
 Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other, Firmware* follower,
               ChangedLog* changed) {
   Replay out;
   Retuned retuned;
-  LoggedIo io(log);
-  LoggedSupervisor supervisor(io.now());
-  HandedOverIo handed_over(io.now());
-  runtime::LoopEnd end;
   std::int64_t expected = 0;
   VerdictJudge judge;
-  const std::atomic<bool> never{false};
-  const auto commands_for = [&io](Firmware& of) {
-    return [&io, &of](std::int64_t, std::int64_t) {
-      if (io.now().has_truth) of.observe_truth(io.now().truth);
-      return command_of(io.now());
-    };
-  };
-  const auto follow = [&](std::int64_t, std::int64_t, const RawSample&, const Command&,
-                          const runtime::TickRecord& record) {
-    if (settled(io.now())) compare_tunings(io.now(), record, &retuned);
-    if (changed != nullptr) changed->add(io.now(), record);
-  };
-  const auto on_tick = [&](std::int64_t, std::int64_t, const RawSample&, const Command&,
-                           const runtime::TickRecord& record) {
-    const runtime::TickRecord& tick = io.now();
+  for (runtime::TickRecord tick; log.next(&tick); ++out.ticks) {
+    const runtime::TickRecord record = again(tick, firmware);
     out.missing += tick.tick - expected;
     expected = tick.tick + 1;
     compare(tick, record, &out.difference);
-    if (follower != nullptr)
-      runtime::run_tick(handed_over, *follower, commands_for(*follower), follow, supervisor, &end);
+    if (follower != nullptr) {
+      const runtime::TickRecord followed = again(tick, *follower);
+      if (settled(tick)) compare_tunings(tick, followed, &retuned);
+      if (changed != nullptr) changed->add(tick, followed);
+    }
     judge.observe(judged(tick));
-    if (!tick.has_truth || !settled(tick)) return;
+    if (!tick.has_truth || !settled(tick)) continue;
     out.logged.add(tick.estimate, tick.truth);
     if (other) out.other.add(record.others[*other], tick.truth);
-  };
-  out.ticks = runtime::run_loop(io, firmware, commands_for(firmware), on_tick, never, supervisor).ticks;
-  io.rethrow();
+  }
   const Verdict by_its_ticks = judge.verdict(false, false);
   out.verdict = log.end() ? Verdict::of(*log.end()) : by_its_ticks;
   out.verdict.numbers = by_its_ticks.numbers;

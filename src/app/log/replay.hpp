@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "app/log/replay.hpp"
 #include "app/log/run_log.hpp"
 #include "app/text/json.hpp"
 #include "app/trial/firmware.hpp"

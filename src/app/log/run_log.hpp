@@ -47,6 +47,23 @@ class RunLog {
 
 Command command_of(const runtime::TickRecord& r) noexcept;
 
+/// A logged tick as the loop's boundary and supervisor: its time, its sample, and what the runtime held
+/// against the motors then. What is commanded goes nowhere.
+struct LoggedTick {
+  std::int64_t now_ns;
+  const RawSample& raw;
+  std::uint32_t inhibit;
+
+  int wait_tick(std::int64_t* out) const noexcept {
+    *out = now_ns;
+    return 0;
+  }
+  RawSample read() const noexcept { return raw; }
+  int write(const MotorCommand& /*command*/) const noexcept { return 0; }
+  std::uint32_t begin(std::int64_t /*now_ns*/, const RawSample& /*raw*/) const noexcept { return inhibit; }
+  void end(bool /*driven*/, int /*write_error*/) const noexcept {}
+};
+
 /// "EQUIPOISE_STATE_EKF13" -> "state_ekf13".
 std::string short_name(std::string_view channel);
 

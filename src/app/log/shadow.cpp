@@ -11,8 +11,6 @@
 namespace equipoise::app {
 namespace {
 
-nlohmann::json number(double v) { return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(nullptr); }
-
 double mean_of(const std::vector<double>& v) {
   if (v.empty()) return std::nan("");
   return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
@@ -26,7 +24,7 @@ double variance_of(const std::vector<double>& v) {
 }
 
 nlohmann::json to_json(const Ahead::Errors& e) {
-  return {{"tilt", number(e.tilt.value())}, {"wheel", number(e.wheel.value())}};
+  return {{"tilt", e.tilt.value()}, {"wheel", e.wheel.value()}};
 }
 
 /// Of the axes that the robot has.
@@ -41,31 +39,27 @@ double tilt_std_rad(const Shadow& s) {
 
 double RootMeanSquare::value() const { return count > 0.0 ? std::sqrt(sum / count) : std::nan(""); }
 
+/// What is no number is written as null.
 nlohmann::json Shadow::json() const {
   nlohmann::json list = nlohmann::json::array();
   for (const ShadowAlarm& a : alarms) {
-    list.push_back({{"t_s", a.t_s},
-                    {"hypothesis", a.hypothesis},
-                    {"ratio", number(a.ratio)},
-                    {"bound", number(a.bound)}});
+    list.push_back({{"t_s", a.t_s}, {"hypothesis", a.hypothesis}, {"ratio", a.ratio}, {"bound", a.bound}});
   }
-  nlohmann::json out{
-      {"judged_s", judged_s},
-      {"starts", starts},
-      {"alarms", list},
-      {"alarms_per_min", judged_s > 0.0 ? nlohmann::json(60.0 * static_cast<double>(alarms.size()) / judged_s)
-                                        : nlohmann::json(nullptr)},
-      {"tilt_std_rad", number(tilt_std_rad(*this))},
-      {"tilt_offset_rad", number(mean_of(tilt_error_rad[0]))},
-      {"tilt_std_own_rad", number(std::sqrt(variance_of(own_tilt_error_rad)))}};
-  for (const auto& [row, square] : nis) out["nis"][row] = number(square.sum / square.count);
+  nlohmann::json out{{"judged_s", judged_s},
+                     {"starts", starts},
+                     {"alarms", list},
+                     {"alarms_per_min", 60.0 * static_cast<double>(alarms.size()) / judged_s},
+                     {"tilt_std_rad", tilt_std_rad(*this)},
+                     {"tilt_offset_rad", mean_of(tilt_error_rad[0])},
+                     {"tilt_std_own_rad", std::sqrt(variance_of(own_tilt_error_rad))}};
+  for (const auto& [row, square] : nis) out["nis"][row] = square.sum / square.count;
   for (const auto& [time, a] : ahead) {
     out["ahead"][time] = to_json(a.model);
     out["ahead"][time]["persistence"] = to_json(a.persistence);
     out["ahead"][time]["constant_rate"] = to_json(a.constant_rate);
   }
   for (const auto& [channel, square] : noise) {
-    out["noise"][channel] = {{"log", number(square.value())}, {"configured", number(configured.at(channel))}};
+    out["noise"][channel] = {{"log", square.value()}, {"configured", configured.at(channel)}};
   }
   return out;
 }

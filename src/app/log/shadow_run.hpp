@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <memory>
 #include <tuple>
 
@@ -149,17 +148,6 @@ class ShadowRun {
     samples_ = std::move(samples);
   }
 
-  /// One logged tick as a hardware boundary.
-  struct Io {
-    const ShadowTick* now;
-    int wait_tick(std::int64_t* now_ns) noexcept {
-      *now_ns = now->now_ns;
-      return 0;
-    }
-    RawSample read() noexcept { return now->raw; }
-    int write(const MotorCommand& /*command*/) noexcept { return 0; }
-  };
-
   Input net(const std::array<double, 3>& u, const Wheels& rates) const {
     return Eigen::Map<const Input>(u.data()) - kinematics_.friction_input(params_.friction, rates);
   }
@@ -170,14 +158,14 @@ class ShadowRun {
     const bool drives = seeded_ && t.armed;
     if (!t.armed) seeded_ = false;
     if (k > 0) pipeline_->applied(net(ticks_[k - 1].u, rates_), !drives);
-    typename P::Result result;
     Command command;
     command.arm = drives;
-    Io io{&t};
+    const LoggedTick logged{t.now_ns, t.raw, 0};
+    typename P::Result result;
+    const auto keep = [&](const auto&, const auto&, const auto&, const auto&, const auto& r) { result = r; };
+    runtime::LoopEnd end;
     runtime::run_tick(
-        io, *pipeline_, [&](std::int64_t, std::int64_t) { return command; },
-        [&](std::int64_t, std::int64_t, const RawSample&, const Command&, const auto& r) { result = r; },
-        nobody_, &end_);
+        logged, *pipeline_, [&](std::int64_t, std::int64_t) { return command; }, keep, logged, &end);
     const auto health = pipeline_->estimators().health();
     rates_ = health.predicts_wheels ? Wheels(health.wheel_rate_rad_s) : Wheels(result.z.wheel_rate_rad_s);
     if (drives && result.arm_state == ArmState::kArmed) judge(k, result);
@@ -315,8 +303,6 @@ class ShadowRun {
   std::vector<bool> judged_;
   std::vector<Estimated> estimates_;
   std::unique_ptr<P> pipeline_;
-  runtime::NoSupervisor nobody_;
-  runtime::LoopEnd end_;
   bool seeded_ = false;
   std::size_t seeded_at_ = 0, from_ = 0;
   Wheels rates_ = Wheels::Zero();
