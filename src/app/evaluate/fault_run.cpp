@@ -9,32 +9,6 @@
 namespace equipoise::app {
 namespace {
 
-/// Per tick the newest command with its age since it came; before the first: since the first tick.
-class LatestCommand {
- public:
-  void renew(const Command& command, std::int64_t now_ns) noexcept {
-    const bool reset = command_.heading_reset || command.heading_reset;  // none of several is lost
-    command_ = command;
-    command_.heading_reset = reset;
-    came_ns_ = now_ns;
-    known_ = true;
-  }
-
-  /// Once per tick.
-  Command at(std::int64_t now_ns) noexcept {
-    if (!known_) renew(command_, now_ns);
-    Command command = command_;
-    command.age_s = 1e-9 * static_cast<double>(now_ns - came_ns_);
-    command_.heading_reset = false;  // once per command
-    return command;
-  }
-
- private:
-  Command command_;
-  std::int64_t came_ns_ = 0;
-  bool known_ = false;
-};
-
 Command command_in(Phase phase, int tick) {
   Command command;
   command.arm = phase != Phase::kDisarmed && tick >= kArmTick;
@@ -136,14 +110,19 @@ FaultOutcome run_with_fault(World& world, Firmware& firmware, const FaultPlan& p
   FaultBackend faulty(plant.io(), seed);
   Hardware hardware(faulty.io());
   runtime::Supervisor supervisor({nullptr, 0, &faulty.log_failed(), true});
-  LatestCommand remote;
+  Command newest;
+  std::int64_t came_ns = 0;  // and when it came
   FaultJudge judge(plan, max_tilt_rad);
   std::atomic<bool> done{false};
 
   const auto commands = [&](std::int64_t tick, std::int64_t now_ns) {
     firmware.observe_truth(world);
-    if (!faulty.remote_silent()) remote.renew(command_in(plan.phase, static_cast<int>(tick)), now_ns);
-    return remote.at(now_ns);
+    if (!faulty.remote_silent()) {
+      newest = command_in(plan.phase, static_cast<int>(tick));
+      came_ns = now_ns;
+    }
+    newest.age_s = 1e-9 * static_cast<double>(now_ns - came_ns);
+    return newest;
   };
   const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&,
                            const runtime::TickRecord& t) {

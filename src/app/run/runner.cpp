@@ -30,26 +30,17 @@
 namespace equipoise::app {
 namespace {
 
-struct TrialLimits {
-  double duration_s = 0.0;  // 0: until the backend or a signal ends it
-  bool end_on_fall = true;
-
-  std::int64_t last_tick() const {
-    return duration_s > 0.0 ? std::llround(duration_s * kTickHz) - 1 : INT64_MAX;
-  }
-};
-
 /// One trial: every tick is judged, recorded and shown, and the last one recognised. operator() is RT-safe.
 class TrialObserver {
  public:
   /// `indicator` may be nullptr.
   TrialObserver(const runtime::Supervisor& supervisor, runtime::Telemetry& telemetry,
-                StatusIndicator* indicator, const TrialLimits& limits)
+                StatusIndicator* indicator, const RunArguments& a)
       : supervisor_(supervisor),
         telemetry_(telemetry),
         indicator_(indicator),
-        last_tick_(limits.last_tick()),
-        end_on_fall_(limits.end_on_fall) {}
+        last_tick_(a.duration_s > 0.0 ? std::llround(a.duration_s * kTickHz) - 1 : INT64_MAX),
+        end_on_fall_(a.backend != "board") {}
 
   void operator()(std::int64_t tick, const runtime::TickRecord& t) noexcept {
     const auto arm_state = static_cast<ArmState>(t.arm_state);
@@ -97,7 +88,7 @@ class TrialObserver {
   const runtime::Supervisor& supervisor_;
   runtime::Telemetry& telemetry_;
   StatusIndicator* indicator_;
-  std::int64_t last_tick_;
+  std::int64_t last_tick_;  // INT64_MAX: until the backend or a signal ends it
   bool end_on_fall_;
   VerdictJudge judge_;
   Trial trial_;
@@ -173,7 +164,7 @@ Outcome Runner::run(rio_t io, int number, StatusIndicator* indicator, const Begi
   Hardware hardware(io);
   const auto firmware = robot_->firmware(a_.choice);
   runtime::Supervisor& supervisor = begin(telemetry.log_failed());
-  TrialObserver observe(supervisor, telemetry, indicator, {a_.duration_s, !on_board()});
+  TrialObserver observe(supervisor, telemetry, indicator, a_);
   const auto on_tick = [&](std::int64_t tick, std::int64_t, const RawSample&, const Command&,
                            const runtime::TickRecord& t) {
     observe(tick, t);
