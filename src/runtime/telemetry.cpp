@@ -37,7 +37,6 @@ class Telemetry::Writer : NoCopy {
       throw std::runtime_error(log_.error());
     if (!options.url.empty()) {
       lcm_ = lcm_create(options.url.c_str());
-      report_->publishing = lcm_ != nullptr;
       if (lcm_ == nullptr) {
         report_->warning =
             "telemetry " + options.url +

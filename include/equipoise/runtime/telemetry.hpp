@@ -40,7 +40,6 @@ struct TelemetryOptions {
 struct TelemetryReport {
   std::int64_t records = 0;
   std::int64_t dropped = 0;
-  bool publishing = false;
   std::string warning;    // telemetry could not be opened
   std::string log_error;  // the log ends early, and why; what is in it is whole
 };

@@ -119,7 +119,7 @@ void read_battery(Section s, Board* board) {
 
 void read_panel(Section& root, Board* board) {
   Section jack = root.table("dc_jack");
-  board->dc_jack_channel = jack.integer("channel", 0, 7);
+  jack.integer("channel", 0, 7);
   jack.number("V_per_count", 1e-6, 1.0);
   jack.number("offset_V", -5.0, 5.0);
   jack.finish();

@@ -23,7 +23,6 @@ struct Board {
   std::vector<BoardLine> led_bars;
   BoardLine button_pause, button_mode;
   bool buttons_active_low = true;
-  int dc_jack_channel = 0;
   std::string serial_device;  // address or path
   int serial_baud = 0;
   std::string can_interface;  // address or name; empty: no CAN

@@ -77,7 +77,7 @@ void ManualDrive::rest(double seconds) {
 
 Stillness ManualDrive::hold_still(double seconds) {
   const int count = static_cast<int>(std::lround(seconds * kTickHz));
-  Vec3 gyro_squares = Vec3::Zero(), accel_squares = Vec3::Zero(), first_half = Vec3::Zero();
+  Vec3 gyro_squares = Vec3::Zero(), first_half = Vec3::Zero();
   std::array<double, kMaxMotors> low{}, high{};
   Stillness s;
   for (int n = 0; n < count; ++n) {
@@ -86,11 +86,9 @@ Stillness ManualDrive::hold_still(double seconds) {
     const Eigen::Map<const Vec3> accel(raw.accel_counts);
     // Welford's means keep the small spread of large numbers.
     const Vec3 gyro_step = gyro - s.gyro;
-    const Vec3 accel_step = accel - s.accel;
     s.gyro += gyro_step / (n + 1);
-    s.accel += accel_step / (n + 1);
+    s.accel += (accel - s.accel) / (n + 1);
     gyro_squares += gyro_step.cwiseProduct(gyro - s.gyro);
-    accel_squares += accel_step.cwiseProduct(accel - s.accel);
     if (n == count / 2 - 1) first_half = s.gyro;
     for (std::size_t i = 0; i < kMaxMotors; ++i) {
       low[i] = n == 0 ? raw.encoder_counts[i] : std::min(low[i], raw.encoder_counts[i]);
@@ -98,7 +96,6 @@ Stillness ManualDrive::hold_still(double seconds) {
     }
   }
   s.gyro_sigma = (gyro_squares / count).cwiseSqrt();
-  s.accel_sigma = (accel_squares / count).cwiseSqrt();
   s.gyro_drift = 2.0 * (s.gyro - first_half);  // the whole is the mean of the halves
   for (std::size_t i = 0; i < kMaxMotors; ++i) s.encoder_travel[i] = high[i] - low[i];
   s.temperature_degC = temperature_degC_;

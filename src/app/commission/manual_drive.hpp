@@ -31,12 +31,11 @@ struct Request {
 /// Says it and waits; false: the person wants to stop. What was typed goes to `answer`.
 using Ask = std::function<bool(const Request& request, std::string* answer)>;
 
-/// Mean and spread of samples in counts, sensor axes.
+/// Means of samples in counts, sensor axes, and the gyro's spread.
 struct Stillness {
   Vec3 gyro = Vec3::Zero();
   Vec3 gyro_sigma = Vec3::Zero();
   Vec3 accel = Vec3::Zero();
-  Vec3 accel_sigma = Vec3::Zero();
   Vec3 gyro_drift = Vec3::Zero();                   // second half's mean minus the first half's
   std::array<double, kMaxMotors> encoder_travel{};  // largest minus smallest count
   double temperature_degC = 0.0;                    // 0: unknown
