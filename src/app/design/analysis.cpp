@@ -191,16 +191,13 @@ constexpr double kSlow_rad_s = 0.5;  // biases of the filter are slower, and tha
 
 constexpr double kUnlimited = 1e9;  // margins are those of the loop inside its limits
 
-nlohmann::json number(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
-
+/// No limit is infinite, which is written as null.
 nlohmann::json to_json(const Margins& m) {
-  return {{"gain_up_dB", number(m.gain_up_dB)},
-          {"gain_down_dB", number(m.gain_down_dB)},
-          {"phase_deg", number(m.phase_deg)},
-          {"delay_ms", number(1e3 * m.delay_s)},
-          {"disk", number(m.disk)}};
+  return {{"gain_up_dB", m.gain_up_dB},
+          {"gain_down_dB", m.gain_down_dB},
+          {"phase_deg", m.phase_deg},
+          {"delay_ms", 1e3 * m.delay_s},
+          {"disk", m.disk}};
 }
 
 nlohmann::json to_json(const Complex& value) { return nlohmann::json::array({value.real(), value.imag()}); }

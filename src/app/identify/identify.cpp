@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <memory>
 
@@ -67,9 +66,8 @@ void print(const Identified& found, std::FILE* out) {
 nlohmann::json to_json(const IdentifyArguments& a, const Identified& found) {
   nlohmann::json estimates = nlohmann::json::object();
   for (const Estimate& e : found.estimates) {
-    const bool bounded = std::isfinite(e.half_width);
     estimates[e.name] = {{"value", e.value},
-                         {"half_width_95", bounded ? nlohmann::json(e.half_width) : nlohmann::json(nullptr)},
+                         {"half_width_95", e.half_width},  // infinite: null
                          {"determined", e.determined()}};
   }
   nlohmann::json json{{"log", a.log}, {"estimates", estimates}, {"r_squared", found.r_squared}};

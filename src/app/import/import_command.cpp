@@ -35,7 +35,6 @@ void write_log(const std::string& path, const std::vector<runtime::TickRecord>& 
 
 nlohmann::json to_json(const ImportArguments& a, const ImportMap& map, const ImportedRobot& robot,
                        const std::vector<runtime::TickRecord>& ticks, const std::vector<Check>& checks) {
-  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(nullptr); };
   std::int64_t fresh = 0;
   std::int64_t balancing = 0;
   for (const runtime::TickRecord& tick : ticks) {
@@ -47,7 +46,7 @@ nlohmann::json to_json(const ImportArguments& a, const ImportMap& map, const Imp
   for (const Check& c : checks) {
     list.push_back({{"name", c.name},
                     {"ok", c.ok ? nlohmann::json(*c.ok) : nlohmann::json(nullptr)},
-                    {"value", number(c.value)},
+                    {"value", c.value},  // null where there is none
                     {"text", c.text}});
     if (c.ok && !*c.ok) wrong.push_back(c.name);
   }

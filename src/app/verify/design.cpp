@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <limits>
 
 #include "app/cli/commands.hpp"
 #include "app/cli/progress.hpp"
@@ -43,15 +42,13 @@ void print(const nlohmann::json& d) {
               d["controller"].get<std::string>().c_str(), d["estimator"].get<std::string>().c_str());
   print_gains(d);
   std::printf("yaw, Hz  broken at       gain, dB        phase, deg   delay margin, ms  disk\n");
-  const auto value = [](const nlohmann::json& v) -> double {
-    return v.is_null() ? std::numeric_limits<double>::infinity() : v.get<double>();
-  };
   for (const nlohmann::json& row : d["rows"]) {
     for (const char* place : kBrokenAt) {
       const nlohmann::json& m = row["margins"][place];
       std::printf("%7.2f  %-9s  %+7.1f  %+7.1f    %10.1f  %17.1f  %5.2f%s\n", row["yaw_hz"].get<double>(),
-                  place, -std::fabs(value(m["gain_down_dB"])), value(m["gain_up_dB"]), value(m["phase_deg"]),
-                  value(m["delay_ms"]), value(m["disk"]), row["stable"].get<bool>() ? "" : "  UNSTABLE");
+                  place, -std::fabs(m["gain_down_dB"].get<double>()), m["gain_up_dB"].get<double>(),
+                  m["phase_deg"].get<double>(), m["delay_ms"].get<double>(), m["disk"].get<double>(),
+                  row["stable"].get<bool>() ? "" : "  UNSTABLE");
     }
   }
 }
