@@ -6,8 +6,7 @@
 #include "bbb_internal.h"
 #include "monotonic.h"
 
-/* --- tick
- * ---------------------------------------------------------------------------------------------------- */
+/* --- tick --- */
 
 static void sleep_until(int64_t deadline_ns) {
   const struct timespec deadline = {.tv_sec = (time_t)(deadline_ns / 1000000000),
@@ -46,8 +45,7 @@ static int wait_tick(void* self, int64_t* now_ns) {
   return 0;
 }
 
-/* --- sensors
- * ------------------------------------------------------------------------------------------------- */
+/* --- sensors --- */
 
 static void read_iio(bbb_t* bbb, rio_sensors_t* out) {
   iio_imu_sample_t sample;
@@ -168,8 +166,7 @@ static int read_sensors(void* self, rio_sensors_t* out) {
   return 0;
 }
 
-/* --- motors
- * -------------------------------------------------------------------------------------------------- */
+/* --- motors --- */
 
 static int wheel_write(bbb_wheel_t* wheel, double duty) {
   return wheel->type == BBB_MC33926 ? mc33926_write(&wheel->driver.mc33926, duty)

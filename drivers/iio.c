@@ -11,8 +11,7 @@
 
 enum { TEXT_MAX = 256 };
 
-/* --- opening
- * ------------------------------------------------------------------------------------------------- */
+/* --- opening --- */
 
 static int fail(iio_fault_t* fault, int code, const char* device, const char* file, const char* value,
                 const char* advice) {
@@ -284,8 +283,7 @@ void iio_close(iio_device_t* device) {
   device->fd = -1;
 }
 
-/* --- in the loop
- * ------------------------------------------------------------------------------------------------- */
+/* --- in the loop --- */
 
 int iio_newest(iio_device_t* device, const uint8_t** scan) {
   const size_t whole = (size_t)device->scan_bytes * IIO_LENGTH;
