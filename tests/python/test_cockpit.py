@@ -236,8 +236,11 @@ def test_a_log_is_filtered_again_with_another_tuning(cockpit, root, logs):
             await socket.write_message(json.dumps(request))
 
         async def hear(*wanted):
+            return await asyncio.wait_for(next_of(wanted), PATIENCE_S)
+
+        async def next_of(wanted):
             while True:
-                message = await asyncio.wait_for(socket.read_message(), PATIENCE_S)
+                message = await socket.read_message()
                 if isinstance(message, bytes):
                     if "frames" in wanted and message[0] == 0:
                         return message
