@@ -10,8 +10,7 @@ using Command = CommandDescription;
 
 constexpr const char* kAbout =
     "Keeps a robot upright on a ball (MBBR) or on two wheels (eduMIP): on a BeagleBone, against another "
-    "physics "
-    "engine, or in a simulated world.";
+    "physics engine, or in a simulated world.";
 
 std::string upper(std::string text) {
   for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));

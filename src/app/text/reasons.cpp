@@ -56,8 +56,7 @@ const std::vector<Reason>& safety_reasons() {
         {When::kArmed, "tilt that it falls to", " rad", tilt_soon, &SafetyParams::max_fall_rad}}},
       {kImuStale, "imu_stale",
        "no new IMU sample for more than safety.max_missed_imu ticks (safety.max_missed_both without "
-       "encoders, "
-       "too), or safety.max_identical_samples identical ones",
+       "encoders, too), or safety.max_identical_samples identical ones",
        "check cable and interrupt pin of the IMU; equipoise doctor"},
       {kEncoderStale, "encoder_stale", "no new encoder counts for more than safety.max_missed_encoders ticks",
        "check the encoder cables and the eQEP overlays"},

@@ -33,9 +33,4 @@ inline double normal_force_over_weight(double alpha_rad) noexcept {
   return 1.0 / (3.0 * std::cos(alpha_rad));
 }
 
-/// Half the angle between the torque axes of a double-row wheel's rows, [T] (2.1).
-inline double row_wobble_rad(double row_spacing_m, double ball_radius_m) noexcept {
-  return std::asin(row_spacing_m / (2.0 * ball_radius_m));
-}
-
 }  // namespace equipoise
