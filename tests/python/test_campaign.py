@@ -156,9 +156,12 @@ def test_bad_runs_are_refused():
         campaign.pair("fast")
 
 
-def trials(root, tmp_path, rows, *arguments):
+def trials(root, tmp_path, rows, *arguments, text=None):
     request = tmp_path / "trials.json"
-    request.write_text(json.dumps({"trials": rows}))
+    written = json.dumps({"trials": rows})
+    for old, new in (text or {}).items():
+        written = written.replace(old, new)
+    request.write_text(written)
     command = [
         root / "build/host/equipoise",
         "trials",
@@ -179,6 +182,15 @@ def test_trials_have_the_same_bytes_on_one_thread_and_on_three(root, tmp_path):
     assert [r["robot"] for r in out] == [0, 1, 2, 3, 4]
     assert out[0]["drawn"] == {}
     assert out[1]["drawn"] != out[2]["drawn"]
+
+
+@pytest.mark.parametrize("seed", ["-1", "1.5", "1e300", '"7"', "null", "1e999"])
+def test_a_seed_is_a_whole_number(root, tmp_path, seed):
+    refused = trials(root, tmp_path, [{"seed": "SEED", "duration_s": 1}], text={'"SEED"': seed})
+    assert refused.returncode == 2 and refused.stdout == ""
+    assert (
+        "trials.json: holds a number that is too large" if seed == "1e999" else "seed: "
+    ) in refused.stderr
 
 
 def test_a_trial_is_the_same_run_as_sim(root, tmp_path):

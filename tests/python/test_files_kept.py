@@ -9,6 +9,7 @@ import pytest
 from equipoise_robot import channels, design
 from equipoise_robot.errors import UserError
 from equipoise_robot.log import read_log
+from equipoise_tools.view import open_source
 
 import lcm
 
@@ -76,9 +77,27 @@ def test_json_replaces_json_only(do, log, root, tmp_path):
     assert "holds no JSON" in do(*sim, "robot.toml", status=2)
     (tmp_path / "blank.txt").write_text(100 * " " + "mine")
     assert "holds no JSON" in do(*sim, "blank.txt", status=2)
+    for name, text in {
+        "mine.toml": "[robot]\nname = 1\n",
+        "essay.rtf": "{\\rtf1 It was}",
+        "half": "[1, ",
+    }.items():
+        (tmp_path / name).write_text(text)
+        assert "holds no JSON" in do(*sim, name, status=2)
+        assert (tmp_path / name).read_text() == text
     assert log.read_bytes() == before
+    (tmp_path / "out.json").write_text(" \n")
     do(*sim, "out.json", status=0)
     do(*sim, "out.json", status=0)
+
+
+def test_attaching_replaces_no_file(tmp_path):
+    kept = tmp_path / "x.lcm"
+    kept.write_bytes(b"mine")
+    for url in (f"file://{kept}?mode=w", f"file://{kept}?mode=a"):
+        with pytest.raises(UserError, match="might replace that file"):
+            open_source(url)
+    assert kept.read_bytes() == b"mine"
 
 
 def test_a_log_of_one_name_leaves_the_others(do, root, tmp_path, known_log):

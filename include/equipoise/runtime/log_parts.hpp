@@ -4,9 +4,13 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace equipoise::runtime {
+
+/// What each event of an LCM log begins with.
+inline constexpr std::string_view kLogSync("\xED\xA1\xDA\x01", 4);
 
 /// NAME.lcm, 3 -> NAME.0003.lcm; 0 is NAME.lcm itself.
 std::string log_part(const std::string& path, int number);

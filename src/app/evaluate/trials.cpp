@@ -28,6 +28,8 @@ SimRequest request_of(const Arguments& a, const nlohmann::json& row) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
       throw InputError("trials: \"" + key + "\" is not a key of a trial");
   }
+  if (row.contains("seed") && !row["seed"].is_number_unsigned())
+    throw InputError("trials: seed: expected a whole number of 0 or more");
   SimRequest r;
   r.config = a.config;
   r.set = a.set;

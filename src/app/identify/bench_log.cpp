@@ -92,7 +92,7 @@ BenchLog read_csv(const std::string& path) {
 }  // namespace
 
 void write_bench_log(const std::string& path, const BenchLog& log) {
-  check_output(path, {"\xED\xA1\xDA\x01"}, "log");
+  check_log(path);
   const std::unique_ptr<lcm_eventlog_t, void (*)(lcm_eventlog_t*)> file(
       lcm_eventlog_create(path.c_str(), "w"), lcm_eventlog_destroy);
   if (file == nullptr) throw InputError(path + ": log cannot be created: " + std::strerror(errno));

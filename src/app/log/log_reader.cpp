@@ -8,7 +8,7 @@
 namespace equipoise::app {
 namespace {
 
-constexpr std::string_view kSync("\xED\xA1\xDA\x01", 4);
+using runtime::kLogSync;
 constexpr std::size_t kEventHeader = 28;  // sync, number, time in microseconds, lengths of channel and data
 constexpr std::size_t kLongestChannel = 256;
 constexpr std::size_t kLargestMessage = 1U << 24U;
@@ -77,9 +77,9 @@ bool LogReader::has(std::size_t bytes) {
 void LogReader::skip_to_sync() {
   ++at_;
   ++damaged_;
-  while (has(kSync.size())) {
-    const std::size_t found = buffer_.find(kSync, at_);
-    const std::size_t to = found != std::string::npos ? found : buffer_.size() - (kSync.size() - 1);
+  while (has(kLogSync.size())) {
+    const std::size_t found = buffer_.find(kLogSync, at_);
+    const std::size_t to = found != std::string::npos ? found : buffer_.size() - (kLogSync.size() - 1);
     damaged_ += to - at_;
     at_ = to;
     if (found != std::string::npos) return;
@@ -94,7 +94,7 @@ bool LogReader::next(LogEvent* event) {
       if (!next_part()) return false;
       continue;
     }
-    if (has(kEventHeader) && buffer_.compare(at_, kSync.size(), kSync) == 0) {
+    if (has(kEventHeader) && buffer_.compare(at_, kLogSync.size(), kLogSync) == 0) {
       const std::string_view header(buffer_.data() + at_, kEventHeader);
       const std::size_t channel = length(header.substr(20, 4));
       const std::size_t data = length(header.substr(24, 4));

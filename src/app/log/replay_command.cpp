@@ -128,7 +128,7 @@ void print(std::FILE* out, const ReplayArguments& a, const runtime::RunInfo& run
 void check_log_output(const ReplayArguments& a) {
   const std::string& path = a.beside.log;
   if (path.empty() || !std::filesystem::exists(path)) return;
-  check_output(path, {"\xED\xA1\xDA\x01"}, "log");
+  check_log(path);
   if (RunLog(path).run().backend != kReplayBackend)
     throw InputError("--log " + path + ": exists and is the log of a run; choose another name");
 }

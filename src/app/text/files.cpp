@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "app/text/errors.hpp"
+#include "equipoise/runtime/log_parts.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -61,9 +62,7 @@ void check_output(const std::string& path, const std::vector<std::string>& begin
   if (const std::string error = output_error(path, beginnings, kind); !error.empty()) throw InputError(error);
 }
 
-std::string json_output_error(const std::string& path) {
-  return path == "-" ? "" : output_error(path, {"{", "["}, "JSON");
-}
+void check_log(const std::string& path) { check_output(path, {std::string(runtime::kLogSync)}, "log"); }
 
 std::string printable(const std::string& text) {
   std::string out = text;

@@ -17,10 +17,14 @@ std::string read_text(const std::string& path);
 /// somebody else's.
 std::string output_error(const std::string& path, const std::vector<std::string>& beginnings,
                          const std::string& kind);
-std::string json_output_error(const std::string& path);
 /// The same, thrown.
 void check_output(const std::string& path, const std::vector<std::string>& beginnings,
                   const std::string& kind);
+
+/// The same of JSON, which other kinds of files begin like: TOML with "[" (json.cpp).
+std::string json_output_error(const std::string& path);
+/// No file but a log is replaced by one.
+void check_log(const std::string& path);
 
 /// For a terminal: control characters, which it would obey, as '?'.
 std::string printable(const std::string& text);

@@ -1,6 +1,7 @@
 #include "app/text/json.hpp"
 
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 
 #include "app/text/errors.hpp"
@@ -14,7 +15,19 @@ nlohmann::json read_json(const std::string& path) {
     return nlohmann::json::parse(read_text(path));
   } catch (const nlohmann::json::parse_error& error) {
     throw InputError(path + ": not valid JSON at byte " + std::to_string(error.byte));
+  } catch (const nlohmann::json::out_of_range&) {
+    throw InputError(path + ": holds a number that is too large");
   }
+}
+
+std::string json_output_error(const std::string& path) {
+  if (path == "-") return "";
+  if (std::string error = output_error(path, {"{", "["}, "JSON"); !error.empty()) return error;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return "";
+  std::ifstream file(path);
+  const bool ours = (file >> std::ws).eof() || nlohmann::json::accept(file);
+  return ours ? "" : path + ": exists and holds no JSON; choose another name";
 }
 
 void write_json(const nlohmann::json& value, const std::string& path) {
