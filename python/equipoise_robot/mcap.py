@@ -24,7 +24,7 @@ def topic_of(channel: str) -> str:
 
 def columns(records: np.ndarray) -> dict[str, np.ndarray]:
     """tick, then each number of a message by its field, or field_0, field_1, ... of an array."""
-    found = {}
+    found: dict[str, np.ndarray] = {}
     for name in records.dtype.names or ():
         values = records[name]
         if values.ndim > 1:
@@ -39,11 +39,10 @@ def messages(channel: str, records: np.ndarray) -> Iterator[Message]:
     for at in range(0, len(records), AT_ONCE):
         piece = records[at : at + AT_ONCE]
         named = columns(piece)
-        # JSON knows no other word for what is no number.
-        values = [
-            v.tolist() if np.isfinite(v).all() else np.where(np.isfinite(v), v.astype(object), None).tolist()
-            for v in named.values()
-        ]
+        values = [v.tolist() for v in named.values()]
+        for column, v in zip(values, named.values(), strict=True):
+            for i in np.flatnonzero(~np.isfinite(v)):
+                column[i] = None  # JSON knows no other word for it
         for utime, *row in zip(piece["utime"].tolist(), *values, strict=True):
             yield 1000 * utime, topic, json.dumps(dict(zip(named, row, strict=True)), separators=(",", ":"))
 
