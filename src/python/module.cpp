@@ -114,7 +114,8 @@ nb::tuple run(app::SimRequest request, const nb::object& controller, const nb::o
   return nb::make_tuple(json, recorder ? nb::object(columns_of(*recorder)) : nb::none());
 }
 
-std::string run_in_engine(app::SimRequest request, const nb::object& make) {
+std::string run_in_engine(app::SimRequest request, const nb::object& make, const nb::object& controller,
+                          const nb::object& estimator) {
   app::check(request);
   std::atomic<bool> stop{false};
   Attention attention(nb::none(), &stop);
@@ -122,7 +123,8 @@ std::string run_in_engine(app::SimRequest request, const nb::object& make) {
     return std::make_unique<PythonEngine>(make, dimensions, &attention);
   };
   const Simulated& robot = simulated(robot_type(request.config));
-  const nlohmann::json out = robot.run_in_engine(std::move(request), engine, stop);
+  const Hooks hooks = hooks_of(controller, estimator, robot.inputs(), &attention);
+  const nlohmann::json out = robot.run_in_engine(std::move(request), engine, hooks, stop);
   attention.rethrow();
   return out.dump();
 }
@@ -208,6 +210,7 @@ void bind_request(nb::module_& m) {
       .def_rw("yaw_rate_rad_s", &SimRequest::yaw_rate_rad_s)
       .def_rw("drive_mps", &SimRequest::drive_mps)
       .def_rw("path", &SimRequest::path)
+      .def_rw("fault", &SimRequest::fault)
       .def_rw("duration_s", &SimRequest::duration_s)
       .def_rw("seed", &SimRequest::seed)
       .def_prop_rw(
@@ -261,6 +264,7 @@ NB_MODULE(_core, m) {
       },
       nb::arg("request"), "of the robot as drawn, SI by name, as JSON");
   m.def("run_in_engine", &run_in_engine, nb::arg("request"), nb::arg("make"),
+        nb::arg("controller").none() = nb::none(), nb::arg("estimator").none() = nb::none(),
         "figures as JSON of a run whose rigid bodies are another engine's; "
         "make(dimensions as JSON, in, out) -> (start, step)");
   m.def(

@@ -40,9 +40,13 @@ class SimulatedOf : public Simulated {
       observe(tick);
     };
     const app::TickObserver& each = recorder != nullptr ? record : observe;
-    const app::SimSummary summary = hooks.any()
-                                        ? hooked_run(*robot, request.choice, options, hooks, each, stop)
-                                        : app::simulate(*robot, request.choice, options, each, stop);
+    const auto simulate = [&] {
+      if (!hooks.any()) return app::simulate(*robot, request.choice, options, each, stop);
+      const Config config = Firmware::apply(static_cast<const Configured&>(*robot).config, request.choice);
+      app::WorldOf<Firmware> world(config, request.choice, options.seed);
+      return hooked_run<World>(world, *robot, config, request.choice, options, hooks, each, stop);
+    };
+    const app::SimSummary summary = simulate();
     nlohmann::json out = app::to_json(request, summary, *robot);
     out["config_toml"] = robot->toml;
     return out;
@@ -54,7 +58,7 @@ class SimulatedOf : public Simulated {
     return Access::dimensions(config.robot, config.world[fidelity_level(request.choice.fidelity)]);
   }
 
-  nlohmann::json run_in_engine(app::SimRequest request, const MakeEngine& make,
+  nlohmann::json run_in_engine(app::SimRequest request, const MakeEngine& make, const Hooks& hooks,
                                const std::atomic<bool>& stop) const override {
     using EngineWorld = typename Firmware::EngineWorld;
     std::vector<config::Drawn> drawn;
@@ -65,12 +69,8 @@ class SimulatedOf : public Simulated {
     const auto engine = make(Access::dimensions(config.robot, params));
     app::WorldOf<Firmware, EngineWorld> world(
         config, EngineWorld(config.robot, config.motor, config.calibration, params, *engine));
-    const app::SimSummary summary =
-        Firmware::with_pipeline(config, request.choice.controller, [&](auto& own) {
-          app::FirmwareOf<Firmware, std::decay_t<decltype(own)>, EngineWorld> firmware(own.params());
-          return app::SimulatedRun(world, firmware, *robot, app::options_for(request, *robot), {}, stop)
-              .run();
-        });
+    const app::SimSummary summary = hooked_run<EngineWorld>(
+        world, *robot, config, request.choice, app::options_for(request, *robot), hooks, {}, stop);
     nlohmann::json out = app::figures(*robot->type, summary);
     out["excluded_healthy"] = (summary.degraded & kSensorsJudged) != 0;
     out["drawn"] = app::by_name(drawn);
@@ -115,11 +115,12 @@ class SimulatedOf : public Simulated {
            a.normalized_innovation == b.normalized_innovation;
   }
 
-  static app::SimSummary hooked_run(const app::ConfiguredRobot& robot, const app::Choice& choice,
-                                    const app::SimOptions& options, const Hooks& hooks,
-                                    const app::TickObserver& observe, const std::atomic<bool>& stop) {
-    const Config config = Firmware::apply(static_cast<const Configured&>(robot).config, choice);
-    app::WorldOf<Firmware> world(config, choice, options.seed);
+  template <class AnyWorld>
+  static app::SimSummary hooked_run(app::WorldOf<Firmware, AnyWorld>& world,
+                                    const app::ConfiguredRobot& robot, const Config& config,
+                                    const app::Choice& choice, const app::SimOptions& options,
+                                    const Hooks& hooks, const app::TickObserver& observe,
+                                    const std::atomic<bool>& stop) {
     return Firmware::with_pipeline(config, choice.controller, [&](auto& own) {
       using Own = std::decay_t<decltype(own)>;
       using Pipeline = app::Hooked<Own>;
@@ -131,7 +132,7 @@ class SimulatedOf : public Simulated {
                                    view(reference, config.robot), Access::error(reference), asked()});
         };
       }
-      app::FirmwareOf<Firmware, Pipeline> firmware(app::hooked<Own>(own.params(), feedback));
+      app::FirmwareOf<Firmware, Pipeline, AnyWorld> firmware(app::hooked<Own>(own.params(), feedback));
       running = &firmware.pipeline();
       if (hooks.estimator) {
         firmware.pipeline().estimators().replace([&](const typename Robot::Sample& z, const Input& u,

@@ -143,7 +143,7 @@ class Simulated : NoCopy {
   virtual nlohmann::json dimensions(app::SimRequest request) const = 0;
   /// The same run in an engine that `make` builds from those.
   using MakeEngine = std::function<std::unique_ptr<Engine>(const nlohmann::json& dimensions)>;
-  virtual nlohmann::json run_in_engine(app::SimRequest request, const MakeEngine& make,
+  virtual nlohmann::json run_in_engine(app::SimRequest request, const MakeEngine& make, const Hooks& hooks,
                                        const std::atomic<bool>& stop) const = 0;
   /// f(seed): configured once, as many episodes as are wanted; in our world, or in the engine that `make`
   /// builds.

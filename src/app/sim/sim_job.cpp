@@ -51,6 +51,7 @@ SimOptions options_for(const SimRequest& request, const ConfiguredRobot& robot) 
   options.script = script_for(robot, request.drive_mps, request.yaw_rate_rad_s, request.path);
   options.duration_s = request.duration_s;
   options.seed = request.seed;
+  if (!request.fault.empty()) options.faults = {planned_fault(request.fault)};
   return options;
 }
 

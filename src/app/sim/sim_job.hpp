@@ -20,6 +20,7 @@ struct SimRequest {
   double yaw_rate_rad_s = 0.0;
   double drive_mps = 0.0;
   std::string path;
+  std::string fault;  // NAME@T or NAME@T+D; empty: none
   double duration_s = 30.0;
   std::uint64_t seed = 1;
 };

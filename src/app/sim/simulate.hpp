@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "app/io/practice_backend.hpp"
 #include "app/trial/firmware.hpp"
 #include "app/trial/path.hpp"
 #include "app/trial/script.hpp"
@@ -114,7 +115,8 @@ struct SimOptions {
   Script script;
   double duration_s = 30.0;
   std::uint64_t seed = 1;
-  bool figures = true;                            // false: only the verdict
+  bool figures = true;  // false: only the verdict
+  std::vector<PlannedFault> faults;
   const std::atomic<bool>* log_failed = nullptr;  // then the motors stop: nothing runs unrecorded
 };
 

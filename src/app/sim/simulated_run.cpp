@@ -15,11 +15,17 @@ SimulatedRun::SimulatedRun(World& world, Firmware& firmware, const ConfiguredRob
       observe_(observe),
       stop_(stop),
       backend_(world),
-      hardware_(backend_.io()),
+      hardware_(broken_as(options.faults, options.seed)),
       meter_(robot_.estimators.size(), robot.rolling_radius_m),
       supervisor_({nullptr, 0, options.log_failed, true}),
       end_tick_(static_cast<std::int64_t>(std::llround(options.duration_s * kTickHz))) {
   if (!observe && !firmware.reads_attitude()) world.without_attitude();
+}
+
+rio_t SimulatedRun::broken_as(const std::vector<PlannedFault>& faults, std::uint64_t seed) {
+  if (faults.empty()) return backend_.io();
+  constexpr double kNoWaiting = std::numeric_limits<double>::infinity();
+  return breaking_.emplace(backend_.io(), kNoWaiting, faults, seed).io();
 }
 
 auto SimulatedRun::commands() {

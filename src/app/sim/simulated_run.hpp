@@ -2,6 +2,8 @@
 // world, firmware, options -> out: summary. Simulation only.
 #pragma once
 
+#include <optional>
+
 #include "app/io/plant_backend.hpp"
 #include "app/sim/simulate.hpp"
 #include "equipoise/no_copy.hpp"
@@ -29,6 +31,7 @@ class SimulatedRun : NoCopy {
   SimSummary summary() const;
 
  private:
+  rio_t broken_as(const std::vector<PlannedFault>& faults, std::uint64_t seed);
   auto commands();
   auto observer();
   void observe(std::int64_t tick, const runtime::TickRecord& t);
@@ -41,6 +44,7 @@ class SimulatedRun : NoCopy {
   const TickObserver& observe_;
   const std::atomic<bool>& stop_;
   PlantBackend backend_;
+  std::optional<PracticeBackend> breaking_;  // where something is to break
   Hardware hardware_;
   RunMeter meter_;
   VerdictJudge judge_;
