@@ -1,0 +1,1 @@
+"""Other people's controllers beside ours, on the same robots; tools/benchmark --help."""

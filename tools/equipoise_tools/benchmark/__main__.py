@@ -1,0 +1,157 @@
+"""Peers of the field beside ours on one population, in both engines; see tools/benchmark --help."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+from pathlib import Path
+
+from equipoise_robot import _core
+
+from ..campaign import Progress
+from ..entry import leave
+from ..paths import UserError, repository_root
+from . import runs, score, tuning
+from .peers import PEERS
+from .workers import Workers
+
+KEPT = repository_root() / "docs" / "reports" / "benchmark.json"
+PAGE = KEPT.with_suffix(".md")
+
+
+def trial_of(row: dict) -> runs.Trial:
+    return runs.Trial(*(row[name] for name in runs.Trial.__dataclass_fields__))
+
+
+def read_runs(path: Path) -> list[dict]:
+    """What was finished; a last line may be torn."""
+    rows = []
+    for line in path.read_text().splitlines() if path.exists() else ():
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError:
+            break
+    return rows
+
+
+def open_folder(out: Path, about: dict) -> list[dict]:
+    """The runs that are there already; of this very benchmark or refused."""
+    out.mkdir(parents=True, exist_ok=True)
+    path, kept = out / "benchmark.json", out / "runs.jsonl"
+    if path.exists() and json.loads(path.read_text()) != about:
+        raise UserError(f"{out}: holds another benchmark (benchmark.json); give another --out or remove it")
+    path.write_text(json.dumps(about, indent=2) + "\n")
+    rows = read_runs(kept)
+    kept.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    return rows
+
+
+def about_of(given: argparse.Namespace, told: dict) -> dict:
+    """What its numbers depend on; the number of robots may grow."""
+    shipped = b"".join(runs.config_path(kind).read_bytes() for kind in runs.CONFIGS)
+    return {
+        "version": _core.version(),
+        "configurations_sha256": hashlib.sha256(shipped).hexdigest(),
+        "tuned_sha256": hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest(),
+        "fidelity": given.fidelity,
+        "first_robot": given.first_robot,
+    }
+
+
+def plan(given: argparse.Namespace) -> list[runs.Trial]:
+    numbers = range(given.first_robot, given.first_robot + given.robots)
+    return sorted(
+        runs.Trial(robot, kind, peer, point, engine)
+        for robot in numbers
+        for kind in given.kinds
+        for peer in given.peers
+        for point in given.points
+        for engine in given.engines
+    )
+
+
+def benchmark(given: argparse.Namespace) -> list[dict]:
+    told = tuning.found()
+    rows = open_folder(given.out, about_of(given, told))
+    wanted = plan(given)
+    done = {trial_of(row) for row in rows}
+    jobs = [(t, given.fidelity, tuning.factors_of(told, t.kind, t.peer)) for t in wanted if t not in done]
+    progress = Progress(len(wanted), len(wanted) - len(jobs))
+    with Workers(given.workers) as workers, (given.out / "runs.jsonl").open("a") as kept:
+        for row in workers.rows(jobs):
+            kept.write(json.dumps(row) + "\n")
+            kept.flush()
+            rows.append(row)
+            progress.add([row])
+    chosen = set(wanted)
+    return sorted((row for row in rows if trial_of(row) in chosen), key=trial_of)
+
+
+def tune(given: argparse.Namespace) -> None:
+    told = tuning.found()
+    with Workers(given.workers) as workers:
+        for kind in given.kinds:
+            for peer in given.peers:
+                size = given.budget, given.training, given.fidelity
+                if tuning.knobs_of(PEERS[peer], kind):
+                    tuning.write(told, kind, peer, tuning.search(kind, peer, *size, workers.fly))
+
+
+def arguments(words: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="tools/benchmark", description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", type=int, default=200, help="of each type")
+    parser.add_argument("--first-robot", type=int, default=901)
+    for name, all_of in (
+        ("kinds", runs.CONFIGS),
+        ("peers", PEERS),
+        ("points", runs.POINTS),
+        ("engines", runs.ENGINES),
+    ):
+        parser.add_argument(f"--{name}", nargs="+", choices=list(all_of), default=list(all_of))
+    parser.add_argument("--fidelity", default="built2025", choices=("built2025", "full", "nominal"))
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--out", type=Path, default=repository_root() / "build" / "benchmark")
+    parser.add_argument("--write", action="store_true", help="docs/reports/benchmark.md and .json")
+    parser.add_argument("--tune", action="store_true", help="search each peer's numbers; robots from 851")
+    parser.add_argument("--budget", type=int, default=24, help="choices that each search may try")
+    parser.add_argument("--training", type=int, default=6, help="robots that each choice is tried on")
+    given = parser.parse_args(words)
+    if min(given.robots, given.workers, given.budget, given.training) < 1:
+        parser.error("numbers must be 1 or more")
+    last = tuning.FIRST_ROBOT + 50
+    if given.training > 50 or not (given.tune or given.first_robot >= last):
+        parser.error(f"robots {tuning.FIRST_ROBOT} to {last - 1} are for the search, those after it score")
+    return given
+
+
+def main(words: list[str] | None = None) -> int:
+    given = arguments(words)
+    try:
+        if given.tune:
+            tune(given)
+            print(tuning.FOUND)
+            return 0
+        rows = benchmark(given)
+        about = {**about_of(given, tuning.found()), "robots": given.robots}
+        told = score.scores(rows)
+        path = given.out / "scores.json"
+        path.write_text(json.dumps({"about": about, "scores": told}, indent=1) + "\n")
+        path.with_name("benchmark.md").write_text(score.page(told, about))
+        if given.write:
+            KEPT.write_text(path.read_text())
+            PAGE.write_text(score.page(told, about))
+        print(path)
+    except (UserError, OSError, ModuleNotFoundError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("\ninterrupted; the same command goes on from here", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    leave(main)

@@ -1,0 +1,210 @@
+"""Controllers of the field in our own code, each in the place of the pipeline's estimator and feedback.
+
+Numbers that a designer would choose are defaults times factors, which `tuning` searches.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are  # type: ignore[import-untyped]
+
+from .. import published, tune
+from ..planar_model import STEP_S
+from .sensing import Known, Senses
+
+MAX_LEAN_RAD = 0.3  # as [controller.*] of the eduMIP
+MOST_U = 2.0
+YAW_RAD_S, YAW_DAMPING = 6.0, 1.0  # of the yaw loop before its factor
+Factors = dict[str, float]
+
+
+def clamp(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
+
+
+def discrete(robot: Known) -> tuple[np.ndarray, np.ndarray]:
+    """The plane's model over a tick with u held."""
+    block = np.zeros((5, 5))
+    block[:4, :4], block[:4, 4] = robot.a, robot.b
+    step = expm(block * STEP_S)
+    return step[:4, :4], step[:4, 4:]
+
+
+def weights(factors: Factors) -> np.ndarray:
+    """Bryson's rule: deviations of tilt, roll and rates that are worth one unit of u."""
+    worth = 0.125 / factors["tilt"], 5.0 / factors["travel"], 3.0, 60.0 / factors["speed"]
+    return np.diag([1.0 / w**2 for w in worth])
+
+
+def lqr(robot: Known, factors: Factors) -> list[float]:
+    """K of u = K (reference - state, minus u of the last tick, which reaches the motors in this one)."""
+    a, b = np.zeros((5, 5)), np.eye(5)[:, 4:]
+    a[:4, :4], a[:4, 4:] = discrete(robot)
+    q = np.zeros((5, 5))
+    q[:4, :4] = weights(factors)
+    p = solve_discrete_are(a, b, q, np.eye(1))
+    return np.linalg.solve(np.eye(1) + b.T @ p @ b, b.T @ p @ a)[0].tolist()
+
+
+class Feedback:
+    """What all have: yaw by proportion and rate with the speed held; a new start after motors off."""
+
+    def __init__(self, robot: Known, senses: Senses, factors: Factors) -> None:
+        self.robot, self.senses = robot, senses
+        omega = YAW_RAD_S * factors.get("yaw", 1.0)
+        self.k_yaw = omega**2 / robot.yaw_gain
+        self.k_yaw_rate = 2.0 * YAW_DAMPING * omega / robot.yaw_gain
+        self.was_held = True
+
+    def __call__(self, tick) -> list[float]:
+        if self.senses.held or self.was_held:
+            self.restart()
+        self.was_held = self.senses.held
+        error = tick.error.tolist()[-2:]
+        wanted = float(tick.reference.omega_B_rad_s[2])
+        rates = tick.reference.phi_dot_rad_s.tolist()
+        u = [clamp(self.axis(i, e, rates[i]), MOST_U) for i, e in enumerate(self.senses.errors(tick))]
+        return [*u, self.k_yaw * error[0] + self.k_yaw_rate * error[1] + self.robot.yaw_hold_s * wanted]
+
+    def restart(self) -> None:
+        pass
+
+    def axis(self, i: int, error: tuple, rate: float) -> float:
+        raise NotImplementedError
+
+
+class CascadePid(Feedback):
+    """librobotcontrol's rc_balance and ArduPilot's balance bot: a loop of the travel sets the lean, a PID of
+    the lean the motors; steering beside it. Tilt is the IMU's own."""
+
+    def __init__(self, robot: Known, factors: Factors) -> None:
+        super().__init__(robot, Senses(robot, packets=True, tilt_s=1.0, rate_s=0.01), factors)
+        theta, roll, theta_dot, roll_dot, _ = lqr(robot, dict.fromkeys(("tilt", "travel", "speed"), 1.0))
+        self.p, self.d = theta * factors["P"], theta_dot * factors["D"]
+        self.i = theta * factors["I"]  # a second's reset time
+        self.speed, self.travel = roll_dot / theta * factors["speed"], roll / theta * factors["travel"]
+        self.restart()
+
+    def restart(self) -> None:
+        self.sums = [0.0, 0.0]
+
+    def axis(self, i: int, error: tuple, rate: float) -> float:
+        lean = clamp(self.speed * error[3] + self.travel * error[1], MAX_LEAN_RAD)
+        off = lean + error[0]
+        limit = 0.5 * MOST_U / abs(self.i)  # the sum does not wind up
+        self.sums[i] = clamp(self.sums[i] + STEP_S * off, limit)
+        return self.p * off + self.i * self.sums[i] + self.d * error[2]
+
+
+class Lqr(Feedback):
+    """State feedback on a complementary filter, the speed held against back-EMF."""
+
+    def __init__(self, robot: Known, factors: Factors) -> None:
+        senses = Senses(robot, packets=False, tilt_s=2.0 * factors["filter"], rate_s=0.01 * factors["rates"])
+        super().__init__(robot, senses, factors)
+        self.k = lqr(robot, factors)
+        self.restart()
+
+    def restart(self) -> None:
+        self.before = [0.0, 0.0]  # u of the feedback
+
+    def axis(self, i: int, error: tuple, rate: float) -> float:
+        theta, roll, theta_dot, roll_dot, before = self.k
+        pull = clamp(roll * error[1], abs(theta) * MAX_LEAN_RAD)
+        feedback = theta * error[0] + pull + theta_dot * error[2] + roll_dot * error[3]
+        self.before[i] = feedback = clamp(feedback - before * self.before[i], MOST_U)
+        return feedback + self.robot.hold_s * rate
+
+
+class Sliding(Lqr):
+    """Sliding mode of the attitude's quaternion error about a reference that an LQR of the travel sets, after
+    Kugle's papers; one tilt at a time is its plane."""
+
+    def __init__(self, robot: Known, factors: Factors) -> None:
+        super().__init__(robot, {**dict.fromkeys(("tilt", "travel", "speed"), 1.0), **factors})
+        theta, roll, theta_dot, roll_dot, _ = self.k
+        self.outer = roll_dot / theta * factors["speed"], roll / theta * factors["travel"]
+        self.slope = theta / theta_dot * factors["slope"]  # 1/s: theta' = -slope theta on the surface
+        self.reach = abs(theta_dot * robot.b[2]) * factors["reach"]  # 1/s, linear within the boundary
+        self.boundary = 0.5 * factors["boundary"]  # rad/s
+
+    def __call__(self, tick) -> list[float]:
+        errors = self.senses.errors(tick)
+        wanted = [clamp(self.outer[0] * e[3] + self.outer[1] * e[1], MAX_LEAN_RAD) for e in errors]
+        self.off = self.vector(wanted, [-e[0] for e in errors])
+        return super().__call__(tick)
+
+    @staticmethod
+    def vector(wanted: list[float], there: list[float]) -> list[float]:
+        """Twice the vector part of conj(there) * wanted, both Ry Rx."""
+
+        def quaternion(angles: list[float]) -> tuple[float, float, float, float]:
+            x, y = angles[0] / 2, (angles[1] if len(angles) > 1 else 0.0) / 2
+            cx, sx, cy, sy = math.cos(x), math.sin(x), math.cos(y), math.sin(y)
+            return cy * cx, cy * sx, sy * cx, -sy * sx
+
+        w, x, y, z = quaternion(there)
+        a, b, c, d = quaternion(wanted)
+        return [2 * (w * b - x * a - y * d + z * c), 2 * (w * c + x * d - y * a - z * b)]
+
+    def axis(self, i: int, error: tuple, rate: float) -> float:
+        surface = error[2] + self.slope * self.off[i]
+        asked = self.slope * error[2] + self.reach * self.boundary * clamp(surface / self.boundary, 1.0)
+        a, theta, theta_dot = self.robot.a[2], -error[0], -error[2]
+        natural = a[0] * theta + a[2] * theta_dot + a[3] * (rate - error[3])
+        return float((asked - natural) / self.robot.b[2])
+
+
+@dataclass(frozen=True)
+class Peer:
+    """`knobs`: what the search may scale, and its bounds; `make`: where it is none of the firmware's own."""
+
+    name: str
+    knobs: dict[str, tuple[float, float]] = field(default_factory=dict)
+    make: Callable[[Known, Factors], Feedback] | None = None
+
+
+WIDE = (0.25, 4.0)
+OURS, DISSERTATION = "ours", "dissertation"
+PEERS = {
+    peer.name: peer
+    for peer in (
+        Peer(OURS),
+        Peer(DISSERTATION),  # as published: nothing to search
+        Peer("pid", dict.fromkeys(("P", "I", "D", "speed", "travel", "yaw"), WIDE), CascadePid),
+        Peer("lqr", dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE), Lqr),
+        Peer(
+            "sliding",
+            dict.fromkeys(("slope", "reach", "boundary", "speed", "travel", "filter", "rates", "yaw"), WIDE),
+            Sliding,
+        ),
+    )
+}
+
+
+def knobs_of(peer: Peer, kind: str) -> dict[str, tuple[float, float]]:
+    if peer.name == OURS:
+        return {knob.name: (knob.low, knob.high) for knob in tune.KNOBS[kind]}
+    return peer.knobs
+
+
+# The firmware's own filters that cannot name a lying encoder shake each wheel after arming: no peer's idea.
+# The estimator that runs beside a peer's and is heard by nobody is the cheapest.
+BESIDE = {"mbbr": ("truth", "thesis"), "mip": ("truth", "lqr")}
+NO_SHAKE = "safety.encoder_check_drive=0.0"
+
+
+def choice(peer: Peer, kind: str, config: dict, factors: Factors) -> tuple[str, str, list[str]]:
+    """Estimator, controller and settings of the firmware."""
+    if peer.name == OURS:
+        return "", "", tune.settings(config, tune.KNOBS[kind], factors) if factors else []
+    if peer.make is not None:
+        return (*BESIDE[kind], [NO_SHAKE])
+    if kind == "mip":  # its robot's library, on the IMU's own tilt: of [T]'s filters it lasts longest here
+        return "attitude", "slc", ["controller.slc.published=true", NO_SHAKE]
+    told = {**published.kf(), **published.gains("Table 6.3")}  # 6.4.6: outlasts its EKF
+    return "kf_attitude", "thesis", [*(f"{k}={v}" for k, v in told.items()), NO_SHAKE]
