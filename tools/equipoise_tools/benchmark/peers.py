@@ -169,11 +169,12 @@ class Peer:
 
 
 WIDE = (0.25, 4.0)
-OURS, DISSERTATION = "ours", "dissertation"
+OURS, SHIPPED, DISSERTATION = "ours", "shipped", "dissertation"
 PEERS = {
     peer.name: peer
     for peer in (
         Peer(OURS),
+        Peer(SHIPPED),  # ours before the search
         Peer(DISSERTATION),  # as published: nothing to search
         Peer("pid", dict.fromkeys(("P", "I", "D", "speed", "travel", "yaw"), WIDE), CascadePid),
         Peer("lqr", dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE), Lqr),
@@ -200,7 +201,7 @@ NO_SHAKE = "safety.encoder_check_drive=0.0"
 
 def choice(peer: Peer, kind: str, config: dict, factors: Factors) -> tuple[str, str, list[str]]:
     """Estimator, controller and settings of the firmware."""
-    if peer.name == OURS:
+    if peer.name in (OURS, SHIPPED):
         return "", "", tune.settings(config, tune.KNOBS[kind], factors) if factors else []
     if peer.make is not None:
         return (*BESIDE[kind], [NO_SHAKE])
