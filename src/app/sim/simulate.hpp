@@ -116,7 +116,7 @@ struct SimOptions {
   double duration_s = 30.0;
   std::uint64_t seed = 1;
   bool figures = true;  // false: only the verdict
-  std::vector<PlannedFault> faults;
+  std::vector<PlannedFault> faults{};
   const std::atomic<bool>* log_failed = nullptr;  // then the motors stop: nothing runs unrecorded
 };
 
