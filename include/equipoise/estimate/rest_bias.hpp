@@ -45,6 +45,8 @@ class RestBias {
   // MPU-9250, data sheet: 5 deg/s at 25 degrees C, 0.24 deg/s per K over 25 K. More is a turning body or a
   // fault.
   static constexpr double kLargest_rad_s = (5.0 + 0.24 * 25.0) * kPi / 180.0;
+  // Garbage among the samples. Real gyros at rest: 0.0009 to 0.0018 rad/s; a robot tolerates 0.2.
+  static constexpr double kRough_rad_s = 0.3;
 
   void end_block() noexcept {
     in_block_ = 0;
@@ -52,7 +54,8 @@ class RestBias {
     // Half the mean squared successive difference is the variance of the noise alone (von Neumann 1941).
     const Vec3 noise = (roughness_ / (2.0 * (kBlock - 1))).cwiseSqrt();
     const Vec3 tolerance = Vec3::Constant(kTurns_rad_s) + kSigmas * std::sqrt(2.0 / kBlock) * noise;
-    const bool plausible = ((mean.cwiseAbs() - tolerance).array() < kLargest_rad_s).all();
+    const bool plausible =
+        ((mean.cwiseAbs() - tolerance).array() < kLargest_rad_s).all() && noise.maxCoeff() < kRough_rad_s;
     const bool same = ((mean - mean_).cwiseAbs().array() < tolerance.array()).all();
     samples_ = !plausible ? 0 : samples_ > 0 && same ? std::min(samples_ + kBlock, kWindow) : kBlock;
     if (samples_ == kBlock) mean_ = mean;

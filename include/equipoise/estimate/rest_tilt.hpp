@@ -1,6 +1,9 @@
-// Tilt of a robot that is held still, from the averaged accelerometer: the estimators start from it.
+// Tilt of a robot that is held still, from the averaged accelerometer, without its garbage: the estimators
+// start from it.
 // In: gravity minus acceleration, body axes -> out: roll, pitch. RT-safe.
 #pragma once
+
+#include <cmath>
 
 #include "equipoise/types.hpp"
 
@@ -9,7 +12,7 @@ namespace equipoise {
 class RestTilt {
  public:
   Vec2 update(const Vec3& accel_B_m_s2) noexcept {
-    if (!accel_B_m_s2.allFinite()) return tilt();
+    if (!(std::abs(accel_B_m_s2.norm() - kGravity_m_s2) < kShaken_m_s2)) return tilt();  // NaN, too
     // A running mean first, then an exponential one: the first estimate is already unbiased.
     samples_ = samples_ < kWindow ? samples_ + 1 : kWindow;
     mean_ += (accel_B_m_s2 - mean_) / samples_;
@@ -23,7 +26,8 @@ class RestTilt {
   }
 
  private:
-  static constexpr int kWindow = 100;  // ticks, 0.5 s
+  static constexpr int kWindow = 100;                          // ticks, 0.5 s
+  static constexpr double kShaken_m_s2 = 0.5 * kGravity_m_s2;  // no sample of a robot that a hand holds
   Vec3 mean_ = Vec3::Zero();
   int samples_ = 0;
 };

@@ -47,6 +47,15 @@ TEST(RestBias, IsFoundInNoise) {
   EXPECT_LT((after(&bias, 400, Vec3(0.1, 0.0, 0.0), sigma) - Vec3(0.1, 0.0, 0.0)).norm(), 5 * sigma / 20);
 }
 
+/// One sample of garbage in a block is 6 rad/s / 25, and makes that block look so rough that it would do.
+TEST(RestBias, GarbageIsNoRest) {
+  RestBias bias;
+  const Vec3 before = after(&bias, 75, kBias, 0.0014);
+  after(&bias, 24, kBias, 0.0014);
+  EXPECT_EQ(bias.update(Vec3(-6.4, 3.0, 20.0)), before);
+  EXPECT_TRUE(bias.known());
+}
+
 TEST(RestBias, MoreThanTheSensorCanHaveIsNoBias) {
   RestBias bias;
   EXPECT_EQ(after(&bias, 4000, Vec3(0.0, 0.0, 0.3), 0.0014), Vec3(0.0, 0.0, 0.0));

@@ -77,6 +77,7 @@ TEST(RestTilt, FindsRollAndPitchFromGravity) {
   EXPECT_NEAR(tilt.x(), roll, 1e-12);
   EXPECT_NEAR(tilt.y(), pitch, 1e-12);
   EXPECT_TRUE(rest.update(Vec3::Constant(std::nan(""))).isApprox(tilt)) << "a NaN does not stick";
+  EXPECT_EQ(rest.update(Vec3(60.0, -20.0, 70.0)), tilt) << "garbage";
 }
 
 }  // namespace
