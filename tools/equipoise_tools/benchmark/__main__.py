@@ -138,7 +138,9 @@ def main(words: list[str] | None = None) -> int:
         about = {**about_of(given, tuning.found()), "robots": given.robots}
         told = score.scores(rows)
         path = given.out / "scores.json"
-        path.write_text(json.dumps({"about": about, "scores": told}, indent=1) + "\n")
+        rounded = json.loads(json.dumps(told), parse_float=lambda number: round(float(number), 4))
+        lines = ",\n".join(json.dumps(row) for row in rounded)
+        path.write_text(f'{{"about": {json.dumps(about)}, "scores": [\n{lines}\n]}}\n')
         path.with_name("benchmark.md").write_text(score.page(told, about))
         if given.write:
             KEPT.write_text(path.read_text())
