@@ -1,10 +1,11 @@
 // A wheel that slips, or a motor that crosses its backlash, turns its encoder alone, by any angle. In: the
 // wheels' innovations and their variances -> out: wider variances of the counted angles, before the
-// correction. The width is the most likely one given an innovation d of variance S: max(0, d^2 - S),
-// covariance matching (Mehra 1972, "Approaches to adaptive filtering"). What exceeds the expected then shifts
-// the count, for good, and not the motion. Stateless, RT-safe.
+// correction. An innovation of more than its standard deviation then corrects as much as one of just that
+// (Huber 1965): what exceeds it shifts the count, for good, and not the motion. It never corrects less than a
+// smaller one would: two filters that differ by rounding stay together. Stateless, RT-safe.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 
 #include "equipoise/types.hpp"
@@ -18,7 +19,7 @@ bool widen_by_slip(Filter& filter, int first_row, int first_state, const Counts&
   bool slipped = false;
   for (int i = 0; i < Wheels; ++i) {
     const auto row = static_cast<std::size_t>(first_row) + static_cast<std::size_t>(i);
-    const double beyond = (filter.row_nis()[row] - 1.0) * filter.row_variance()[row];
+    const double beyond = (std::sqrt(filter.row_nis()[row]) - 1.0) * filter.row_variance()[row];
     if (!(beyond > 0.0)) continue;  // unused, as expected, or not a number
     filter.widen(first_state, counts(Vec<Wheels>::Unit(i)), beyond);
     slipped = true;
