@@ -17,6 +17,20 @@ struct EvidenceParams {
   std::array<double, 3> gyro_sigma_rad_s{};  // of what turns the body beside the model, at least
 };
 
+struct SensorFaultsParams {
+  EvidenceParams evidence;
+  std::array<bool, 3> balances{};  // gyro axes without which the robot falls
+  Vec3 axis_sign = Vec3::Ones();   // of the sensor's axis along each of the body's
+
+  /// One of these does.
+  bool balance(std::uint32_t axes) const noexcept {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (balances[i] && (axes >> i & 1U) != 0) return true;
+    }
+    return false;
+  }
+};
+
 template <class Filter, int Wheels>
 class Evidence {
  public:
@@ -110,6 +124,20 @@ class Evidence {
   static double reading(const Sample& z, std::size_t row) noexcept {
     return row < 3 ? z.gyro_B_rad_s(static_cast<int>(row))
                    : z.wheel_angle_rad(static_cast<int>(row - kWheelRow));
+  }
+
+  /// A sensor that stands still or counts backwards, since it read `from`, may look healthy, too, while
+  /// nothing moves much: what speaks against that, nats.
+  double unless_faulty(const Filter& f, const Sample& used, const Sample& z, int index,
+                       double from) const noexcept {
+    const auto row = static_cast<std::size_t>(index);
+    if (!comes(used, row)) return 0.0;
+    const double innovation = f.row_innovation()[row];
+    const double reads = reading(z, row);
+    const double moved = reads - from;
+    const double backwards = 2.0 * (row < 3 ? reads : moved) - innovation;
+    const double faulty = std::min(moved * moved, backwards * backwards);
+    return 0.5 * (faulty - innovation * innovation) / spread(f, row);
   }
 
   static constexpr double kOutlier = 12.0;  // nats, that one tick may say at most

@@ -20,7 +20,9 @@ struct FaultHypothesis {
     kSpin,      // no fault: the ball has spun on the floor
     kSlip,      // no fault: wheels have slipped
     kPush,      // no fault: something has pushed the body
-    kNoise      // no fault: the IMU shakes more than lately
+    kNoise,     // no fault: the IMU shakes more than lately
+    kRock,      // no fault: a wheel was hit, a robot on two of them rocks
+    kEvent      // no fault: one of these was lately
   } kind = kWheel;
   std::uint32_t mask = 0;  // of its wheels or axes
   constexpr int first() const noexcept {
@@ -33,16 +35,16 @@ struct FaultHypothesis {
     while (i > 0 && (mask >> i & 1U) == 0) --i;
     return i;
   }
-  constexpr bool healthy() const noexcept {
-    return kind == kSpin || kind == kSlip || kind == kPush || kind == kNoise;
-  }
+  constexpr bool healthy() const noexcept { return kind >= kSpin; }
+  constexpr bool pushes() const noexcept { return kind == kPush || kind == kRock; }
   constexpr bool wiring() const noexcept { return kind == kReversed || kind == kSwap; }
 };
 
-template <int Wheels>
+/// `Rocks`: about the axis ahead, whose gyro then tells of the floor.
+template <int Wheels, bool Rocks = Wheels == 2>
 constexpr auto fault_hypotheses() noexcept {
   constexpr int kPairs = Wheels * (Wheels - 1) / 2;
-  std::array<FaultHypothesis, static_cast<std::size_t>(2 * Wheels + kPairs + 3 + 3 + 6)> all{};
+  std::array<FaultHypothesis, static_cast<std::size_t>(2 * Wheels + kPairs + 3 + 3 + (Rocks ? 8 : 6))> all{};
   std::size_t n = 0;
   for (int i = 0; i < Wheels; ++i) all[n++] = {FaultHypothesis::kWheel, 1U << i};
   for (int i = 0; i < Wheels; ++i) all[n++] = {FaultHypothesis::kReversed, 1U << i};
@@ -57,11 +59,24 @@ constexpr auto fault_hypotheses() noexcept {
   all[n++] = {FaultHypothesis::kSlip, 0};
   all[n++] = {FaultHypothesis::kPush, 0};
   all[n++] = {FaultHypothesis::kNoise, 0};
+  if (Rocks) {
+    all[n++] = {FaultHypothesis::kRock, 1U << 1};
+    all[n++] = {FaultHypothesis::kEvent, 0};
+  }
   return all;
 }
 
+/// Of a kind that a robot has but once.
+template <int Wheels>
+constexpr std::size_t fault_index(FaultHypothesis::Kind kind) noexcept {
+  constexpr auto kAll = fault_hypotheses<Wheels>();
+  std::size_t i = 0;
+  while (kAll[i].kind != kind) ++i;
+  return i;
+}
+
 /// Everybody's bits on the wire.
-inline constexpr std::array<const char*, fault_hypotheses<4>().size()> kFaultNames{
+inline constexpr std::array<const char*, fault_hypotheses<4, true>().size()> kFaultNames{
     // of a robot with four wheels
     "encoder_1",
     "encoder_2",
@@ -88,13 +103,15 @@ inline constexpr std::array<const char*, fault_hypotheses<4>().size()> kFaultNam
     "spin",
     "slip",
     "push",
-    "imu_noise"};
+    "imu_noise",
+    "rock",
+    "event"};
 static_assert(kFaultNames.size() <= 32, "FaultEvidence::verdicts has a bit for each");
 
 /// Of each hypothesis of a robot its row among kFaultNames.
 template <int Wheels>
 constexpr auto fault_rows() noexcept {
-  constexpr auto kAll = fault_hypotheses<4>();
+  constexpr auto kAll = fault_hypotheses<4, true>();
   constexpr auto kOwn = fault_hypotheses<Wheels>();
   std::array<std::int32_t, kOwn.size()> rows{};
   for (std::size_t i = 0; i < kOwn.size(); ++i) {

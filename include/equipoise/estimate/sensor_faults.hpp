@@ -4,7 +4,7 @@
 // leads all others by a margin changes which sensors are used; else none is trusted. Slipping and pushes are
 // hypotheses, too, of healthy robots. Derivation and constants: docs/faults.md. In: input, Measurement ->
 // out: the control's filter, which sensors it uses, whether they can be trusted. RT-safe. Filter: predict,
-// update, adopt, row_innovation, row_variance, wheel_angle_rad, allow_push, allow_slip, doubt_bias.
+// update, adopt, row_innovation, row_variance, wheel_angle_rad, doubt_bias, allow_push and its like.
 #pragma once
 
 #include <algorithm>
@@ -14,18 +14,14 @@
 
 #include "equipoise/estimate/evidence.hpp"
 #include "equipoise/estimate/fault_hypotheses.hpp"
+#include "equipoise/estimate/fault_member.hpp"
 #include "equipoise/estimate/gross_samples.hpp"
 #include "equipoise/estimate/health.hpp"
+#include "equipoise/estimate/roll_watch.hpp"
 #include "equipoise/estimate/used_sensors.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
-
-struct SensorFaultsParams {
-  EvidenceParams evidence;
-  std::array<bool, 3> balances{};  // gyro axes without which the robot falls
-  Vec3 axis_sign = Vec3::Ones();   // of the sensor's axis along each of the body's
-};
 
 template <class Filter, int Wheels>
 class SensorFaults {
@@ -36,8 +32,7 @@ class SensorFaults {
   static constexpr auto kHypotheses = fault_hypotheses<Wheels>();
   static constexpr std::size_t kCount = kHypotheses.size();
 
-  /// `filter`: the control's; the evidence is weighed by the encoders' noise, not the one that its margins
-  /// ask for.
+  /// `filter`: with the noise that there is, not what margins ask for.
   SensorFaults(const Filter& filter, const SensorFaultsParams& params)
       : p_(params),
         gross_(params.balances),
@@ -46,11 +41,7 @@ class SensorFaults {
         before_(healthy_),
         members_(filled(healthy_, std::make_index_sequence<kCount>())) {
     for (std::size_t i = 0; i < 3; ++i) quiet_[i] = filter.row_noise(i);
-    Filter& shaken = members_[kCount - 1].filter;
-    static_assert(kHypotheses[kCount - 1].kind == FaultHypothesis::kNoise);
-    for (std::size_t i = 0; i < 3; ++i) shaken.set_row_noise(i, kNoise_rad_s * kNoise_rad_s);
-    for (std::size_t i = Evidence::kAccelRow; i < Evidence::kRows; ++i)
-      shaken.set_row_noise(i, kNoise_m_s2 * kNoise_m_s2);
+    members_[fault_index<Wheels>(FaultHypothesis::kNoise)].shake();
     reset(filter, 0.0);
   }
 
@@ -61,8 +52,10 @@ class SensorFaults {
     evidence_ = {-1, 0.0, kBound, -1, 0.0, false, evidence_.verdicts};
     gross_.reset();
     weigh_.reset(rest_sigma_rad_s);
+    roll_.reset();
     trusted_ = true;
-    ticks_ = jumps_ = event_at_ = 0;
+    ticks_ = jumps_ = event_at_ = leads_for_ = 0;
+    rocks_at_ = -kRocking;
     stale_ = true;
   }
 
@@ -72,7 +65,7 @@ class SensorFaults {
     const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
     hear_vibration(control, {});
     control.predict(u);
-    control.update(used_.of(z));
+    control.update(used_.with_axes(rocking()).of(z));
     if (!raw.imu_ok || !raw.encoders_ok) {  // nothing to weigh against each other
       healthy_.predict(u);
       healthy_.update(used_.of(z));
@@ -84,12 +77,15 @@ class SensorFaults {
     advance_all(u, z);
     weigh_.hear(z);
     decide(control);
+    if (kRocks && trusted_) watch_roll(control, expected_rad_s);
   }
 
+  /// What the verdicts are compared with.
+  const Filter& healthy() const noexcept { return healthy_; }
   bool trusted() const noexcept { return trusted_ && gross_.trusted(); }
   std::uint32_t excluded_wheels() const noexcept { return used_.without_wheels; }
   bool gyro_axis_excluded() const noexcept {
-    return (used_.without_axes | used_.swapped) != 0 || gross_.left_out();
+    return ((used_.without_axes & ~rocking()) | used_.swapped) != 0 || gross_.left_out();
   }
   int bias_jumps() const noexcept { return jumps_; }
   /// A fault leads: what surprises the control's filter is about to be explained.
@@ -103,7 +99,10 @@ class SensorFaults {
  private:
   using Evidence = equipoise::Evidence<Filter, Wheels>;
   using Used = UsedSensors<Wheels>;
+  using Member = FaultMember<Filter, Wheels>;
   static constexpr auto kRows = fault_rows<Wheels>();
+  static constexpr bool kRocks = kHypotheses[kCount - 1].kind == FaultHypothesis::kEvent;
+  static constexpr std::uint32_t kAhead = 1U << 1;  // the gyro's axis about which it rocks
 
   // Decisions, in nats. A false alarm in ten hours of ticks and sixteen hypotheses: ln(7.2e6 * 16)
   // (Lorden 1971).
@@ -114,25 +113,12 @@ class SensorFaults {
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
+  static constexpr int kRocking = 400;      // no body rocks for longer
   static constexpr int kStillTicks = 4;     // of an encoder that stands
   // Events and faults.
-  static constexpr double kPush_N = 1.0;           // of pushes of 0.5 to 4 N, one sigma in a tick
-  static constexpr double kNoise_rad_s = 0.15;     // of an IMU that shakes: real robots that roll reach 0.1
-  static constexpr double kNoise_m_s2 = 3.0;       // and 3
-  static constexpr double kSlip_rad = 0.01;        // in a tick: a ball that spins at 2 rad/s on a sill
   static constexpr double kLeastJump_rad_s = 0.1;  // the filter's own bias learns less
   static constexpr double kJump_rad_s = 0.3;
   static constexpr double kBias_rad_s = 0.1;  // uncertain after a jump: the noise of one sample
-
-  struct Member {
-    Filter filter;
-    Used used{};
-    double ratio = 0.0;  // log-likelihood, of the hypothesis over what is used, since it was last refuted
-    int since = 0;       // tick
-    bool from_start = false;  // not refuted since arming
-    int returns = -1;         // row of an excluded sensor that may be healthy again
-    double from = 0.0;        // what that read when the member began
-  };
 
   static Filter with_noise(Filter filter, const SensorFaultsParams& p) {
     filter.let_encoders_slip(false);  // slipping is a hypothesis of its own
@@ -159,9 +145,12 @@ class SensorFaults {
     for (std::size_t i = 0; i < kCount; ++i) begin(i, healthy_);
     stale_ = false;
     suspects_ = false;
-    undecided_ = 0;
+    undecided_ = leads_for_ = 0;
   }
 
+  static constexpr bool waits(const FaultHypothesis& h) noexcept {
+    return h.kind == FaultHypothesis::kBias || h.kind == FaultHypothesis::kEvent;
+  }
   void begin(std::size_t i, const Filter& from) noexcept {
     const FaultHypothesis& h = kHypotheses[i];
     Member& m = members_[i];
@@ -173,12 +162,13 @@ class SensorFaults {
       m.used.offset_rad(h.first()) =
           before_.wheel_angle_rad()(h.first()) - weigh_.before().wheel_angle_rad(h.first());
     if (m.used.reversed >= 0) m.used.mirror_rad = from.wheel_angle_rad()(m.used.reversed);
-    m.ratio = h.kind == FaultHypothesis::kBias ? -kMargin : 0.0;  // until it jumps
+    m.ratio = waits(h) ? -kMargin : 0.0;
     m.since = ticks_;
     m.from_start = ticks_ <= kArmingTicks;
     m.returns = -1;
     if (wheel_returns) m.returns = Model::kWheel + h.first();
-    if (h.kind == FaultHypothesis::kAxis && (used_.without_axes & h.mask) != 0) m.returns = h.first();
+    if (h.kind == FaultHypothesis::kAxis && (used_.without_axes & ~rocking() & h.mask) != 0)
+      m.returns = h.first();
     if (m.returns >= 0) m.from = Evidence::reading(weigh_.before(), static_cast<std::size_t>(m.returns));
   }
 
@@ -214,19 +204,19 @@ class SensorFaults {
                           weigh_.jump(healthy_, used, p_.balances, kJump_rad_s) > std::max(m.ratio, 0.0);
         if (anew && all > -kMargin) return jumped(i, u, z, all);
       }
+    }
+    if (waits(h)) {
       if (m.ratio <= -kMargin) return;
     } else if (m.ratio <= -kMargin || (h.healthy() && ticks_ - m.since > kEventTicks)) {
+      if (kRocks && h.healthy()) members_[kCount - 1].keep(m);
       begin(i, before_);
     }
     if (h.kind != FaultHypothesis::kNoise) hear_vibration(m.filter, p_.evidence.gyro_sigma_rad_s);
-    m.filter.predict(u);
-    if (h.kind == FaultHypothesis::kPush) m.filter.allow_push(kPush_N);
-    if (h.kind == FaultHypothesis::kSpin) m.filter.allow_spin(kSlip_rad);
-    if (h.kind == FaultHypothesis::kSlip) m.filter.allow_slip(kSlip_rad);
+    m.predict(h, u);
     const Sample used = m.used.of(z);
     m.filter.update(used);
     double gain = weigh_(m.filter, used, z) - as_used;
-    if (m.returns >= 0) gain = std::min(gain, unless_faulty(m, z));
+    if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
     m.ratio = std::max(m.ratio + gain, -kMargin);
     if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < least_jump_rad_s()) m.ratio = -kMargin;
   }
@@ -265,16 +255,20 @@ class SensorFaults {
     m.ratio = ratio;
   }
 
-  /// A sensor that stands still or counts backwards may look healthy, too, while nothing moves much.
-  double unless_faulty(const Member& m, const Sample& z) const noexcept {
-    const auto row = static_cast<std::size_t>(m.returns);
-    if (!Evidence::comes(m.used.of(z), row)) return 0.0;
-    const double innovation = m.filter.row_innovation()[row];
-    const double reads = Evidence::reading(z, row);
-    const double moved = reads - m.from;
-    const double backwards = 2.0 * (row < 3 ? reads : moved) - innovation;
-    const double faulty = std::min(moved * moved, backwards * backwards);
-    return 0.5 * (faulty - innovation * innovation) / weigh_.spread(m.filter, row);
+  /// The axis ahead is left out while the body rocks, from the evidence only, and no fault.
+  std::uint32_t rocking() const noexcept { return kRocks && ticks_ - rocks_at_ < kRocking ? kAhead : 0U; }
+  void watch_roll(const Filter& control, const Vec3& rates_rad_s) noexcept {
+    constexpr std::size_t kBias = fault_index<Wheels>(FaultHypothesis::kBias);
+    roll_.hear(control.row_innovation()[1], rates_rad_s.z());
+    if (!roll_.trusted()) return stop(kBias, kBias);
+    if (ticks_ - rocks_at_ == kRocking) tell(fault_index<Wheels>(FaultHypothesis::kAxis) + 1);
+  }
+  /// What is held to be faulty from this tick on.
+  void tell(std::size_t hypothesis) noexcept {
+    evidence_.leading = kRows[hypothesis];
+    const std::uint32_t verdicts = used_.with_axes(rocking()).verdicts();
+    evidence_.decided = verdicts != evidence_.verdicts;
+    evidence_.verdicts = verdicts;
   }
 
   enum Consequence { kNone = -1, kStop = -2 };  // else the hypothesis' own
@@ -283,25 +277,28 @@ class SensorFaults {
     if (h.healthy()) return kNone;
     const bool gyro = h.kind == FaultHypothesis::kSwap ||
                       (h.kind == FaultHypothesis::kAxis && (used_.without_axes & h.mask) == 0);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (gyro && p_.balances[axis] && (h.mask >> axis & 1U) != 0) return kStop;
-    }
-    if (h.kind == FaultHypothesis::kImu) return kStop;
+    if ((gyro && p_.balance(h.mask)) || h.kind == FaultHypothesis::kImu) return kStop;
     return h.kind == FaultHypothesis::kReversed ? h.first() : static_cast<int>(i);  // as kWheel
   }
-  /// Whatever is read wrongly could as well be left out.
+  /// Two axes of the gyro that do not balance.
+  bool can_wait(const FaultHypothesis& wiring) const noexcept {
+    return wiring.kind == FaultHypothesis::kSwap && !p_.balance(wiring.mask);
+  }
+  /// Whatever is read wrongly could as well be left out; what can wait, does so until each axis could.
   bool left_out_explains(const FaultHypothesis& wiring) const noexcept {
     const auto out = wiring.kind == FaultHypothesis::kSwap ? FaultHypothesis::kAxis : FaultHypothesis::kWheel;
+    std::size_t explained = 0;
     for (std::size_t i = 0; i < kCount; ++i) {
       const bool its = kHypotheses[i].kind == out && (kHypotheses[i].mask & wiring.mask) != 0;
-      if (its && members_[i].ratio > 0.0) return true;
+      explained += its && members_[i].ratio > 0.0 ? 1 : 0;
     }
-    return false;
+    return explained >= (can_wait(wiring) ? 2 : 1);
   }
   double weighed(std::size_t i) const noexcept {
     const FaultHypothesis& h = kHypotheses[i];
     if (!applies(h)) return -kMargin;
-    if (h.wiring() && !members_[i].from_start && !left_out_explains(h)) return -kMargin;
+    const bool from_start = members_[i].from_start && !can_wait(h);
+    if (h.wiring() && !from_start && !left_out_explains(h)) return -kMargin;
     if (h.wiring()) return members_[i].ratio - kEventPrior;
     return members_[i].ratio + (h.healthy() && ticks_ - event_at_ > kEventTicks ? kEventPrior : 0.0);
   }
@@ -322,6 +319,8 @@ class SensorFaults {
     }
     const std::int32_t next = runner_up == best ? -1 : kRows[runner_up];
     evidence_ = {kRows[best], weight[best], kBound, next, second, false, evidence_.verdicts};
+    leads_for_ = best == leader_ && weight[best] > kBound ? leads_for_ + 1 : 0;
+    leader_ = best;
     if (!(weight[best] > kBound)) {
       undecided_ = 0;
       return;
@@ -333,6 +332,9 @@ class SensorFaults {
       if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) stop(best, runner_up);
       return;
     }
+    // A bias or a dead axis stays, a blow that looks like one does not. Swapped, it falls before.
+    const auto lasts = leads == kStop ? FaultHypothesis::kAxis : FaultHypothesis::kBias;
+    if (kHypotheses[best].kind == lasts && leads_for_ < kPatience) return;
     if (leads == kStop) return stop(best, best);
     use(best);
     control.adopt(healthy_);
@@ -340,6 +342,7 @@ class SensorFaults {
 
   /// One of them is true; the robot cannot go on with either.
   void stop(std::size_t one, std::size_t other) noexcept {
+    evidence_.leading = kRows[one];
     evidence_.decided = trusted_;
     evidence_.verdicts |= 1U << kRows[one] | 1U << kRows[other];
     trusted_ = false;
@@ -349,7 +352,7 @@ class SensorFaults {
   /// The control's filter takes a push by its own input noise; it knows of no noisier samples.
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].filter);
-    if (kHypotheses[event].kind != FaultHypothesis::kPush) control.adopt(healthy_);
+    if (!kHypotheses[event].pushes()) control.adopt(healthy_);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.ratio = std::max(m.ratio - ratio, -kMargin);
     begin(event, healthy_);
@@ -371,14 +374,15 @@ class SensorFaults {
     used_.without_wheels = without;
     healthy_.adopt(m.filter);
     if (h.kind == FaultHypothesis::kBias) ++jumps_;
-    evidence_.decided = true;
-    evidence_.verdicts = used_.verdicts();
+    if (h.kind == FaultHypothesis::kAxis && h.mask == kAhead) rocks_at_ = ticks_;
+    tell(hypothesis);
     begin_all();
   }
 
   SensorFaultsParams p_;
   GrossSamples gross_;
   Evidence weigh_;
+  RollWatch roll_;
   Filter healthy_;  // with everything that is used
   Filter before_;   // a tick ago
   std::array<Member, kCount> members_;
@@ -386,14 +390,11 @@ class SensorFaults {
   FaultEvidence evidence_;
   std::array<double, 3> quiet_{};  // the gyro's variances
   bool stale_ = true;              // members have missed a tick
-  bool trusted_ = true;
-  bool suspects_ = false;
-  bool stood_still_ = false;  // the encoder that was excluded last
-  int ticks_ = 0;             // since arming
-  int excluded_at_ = 0;
-  int jumps_ = 0;
-  int event_at_ = 0;  // tick
-  int undecided_ = 0;
+  bool trusted_ = true, suspects_ = false;
+  bool stood_still_ = false;   // the encoder that was excluded last
+  int ticks_ = 0, jumps_ = 0;  // since arming
+  int excluded_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
+  std::size_t leader_ = 0;
 };
 
 }  // namespace equipoise

@@ -43,6 +43,12 @@ struct UsedSensors {
     return s;
   }
 
+  UsedSensors with_axes(std::uint32_t axes) const noexcept {
+    UsedSensors u = *this;
+    u.without_axes &= ~axes;
+    return u;
+  }
+
   /// Bit per row of kFaultNames: what they are read by.
   std::uint32_t verdicts() const noexcept {
     constexpr auto kHypotheses = fault_hypotheses<Wheels>();
@@ -66,6 +72,7 @@ struct UsedSensors {
     if (h.kind == FaultHypothesis::kWheels) u.without_wheels |= h.mask;
     if (h.kind == FaultHypothesis::kReversed) u.reversed = h.first();
     if (h.kind == FaultHypothesis::kAxis) u.without_axes ^= h.mask;
+    if (h.kind == FaultHypothesis::kRock) u.without_axes |= h.mask;
     if (h.kind == FaultHypothesis::kSwap) u.swapped = h.mask;
     if (h.kind == FaultHypothesis::kImu) u.imu = false;
     return u;

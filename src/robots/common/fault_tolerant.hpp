@@ -52,8 +52,13 @@ class FaultTolerant {
   }
 
  protected:
-  FaultTolerant(const Params& params, const SensorFaultsParams& faults)
-      : params_(params), kinematics_(params.robot), ekf_(params.robot, params.ekf), faults_(ekf_, faults) {
+  /// `evidence`: the default filter's parameters as the detector has them.
+  FaultTolerant(const Params& params, const SensorFaultsParams& faults,
+                const typename Filter::Params& evidence)
+      : params_(params),
+        kinematics_(params.robot),
+        ekf_(params.robot, params.ekf),
+        faults_(Filter(params.robot, evidence), faults) {
     ekf_.let_encoders_slip(!params.detection);  // else the detector judges what an encoder does to the filter
   }
 

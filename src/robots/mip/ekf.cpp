@@ -184,6 +184,10 @@ MipEkf::MipEkf(const MipParameters& robot, const Params& params)
     return Vec2(x_dot(Model::kThetaDot), x_dot(Model::kPhiDot));
   };
   per_push_ = push_response({robot.m_b, robot.l, robot.r, 2.0 * robot.k1}, rates);
+  Model::Motion x_dot;
+  Mat<6, 6> A;
+  model.derivative(Model::Motion::Zero(), Vec2::UnitY(), x_dot, A);  // the wheels push against each other
+  per_hit_ = kTickS * x_dot(Model::kPsiDot) * robot.r / (2.0 * robot.k1);
   start(0.0, Vec3::Zero(), Vec2::Zero());
 }
 

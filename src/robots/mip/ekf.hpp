@@ -113,6 +113,10 @@ class MipEkf {
 
   /// A force at the body's centre of mass acted in the predicted tick.
   void allow_push(double sigma_N) noexcept;
+  /// One wheel was hit: the robot yaws.
+  void allow_hit(double sigma_N) noexcept {
+    filter_.widen(Model::kPsiDot, 1, std::pow(sigma_N * per_hit_, 2));
+  }
   /// The robot has turned on the floor in it, otherwise than its wheels say.
   void allow_spin(double sigma_rad) noexcept { filter_.widen(Model::kPsi, 1, sigma_rad * sigma_rad); }
   /// Wheels have slipped on the floor in it.
@@ -147,7 +151,8 @@ class MipEkf {
 
   MipKinematics kinematics_;
   Filter filter_;
-  Vec2 per_push_;  // change of tilt and wheel rate in a tick, per N
+  double per_hit_ = 0.0;  // change of yaw rate in a tick, per N
+  Vec2 per_push_;         // change of tilt and wheel rate in a tick, per N
   TimeBase<2, 2> time_;
   bool encoders_slip_ = false;
   Vec2 gyro_bias_yz_ = Vec2::Zero();

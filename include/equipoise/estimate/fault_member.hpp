@@ -1,0 +1,54 @@
+// A hypothesis with its filter: how the samples are read if it holds, what it allows the body to do, and how
+// much likelier it is than what is used. In: input -> out: prediction. RT-safe.
+#pragma once
+
+#include <algorithm>
+
+#include "equipoise/estimate/fault_hypotheses.hpp"
+#include "equipoise/estimate/used_sensors.hpp"
+
+namespace equipoise {
+
+template <class Filter, int Wheels>
+struct FaultMember {
+  static constexpr double kPush_N = 1.0;     // of pushes of 0.5 to 4 N, one sigma in a tick
+  static constexpr double kSlip_rad = 0.01;  // in a tick: a ball that spins at 2 rad/s on a sill
+
+  static constexpr double kNoise_rad_s = 0.15;  // of an IMU that shakes: real robots that roll reach 0.1
+  static constexpr double kNoise_m_s2 = 3.0;    // and 3
+
+  Filter filter;
+  UsedSensors<Wheels> used{};
+  double ratio = 0.0;       // log-likelihood, of the hypothesis over what is used, since it was last refuted
+  int since = 0;            // tick
+  bool from_start = false;  // not refuted since arming
+  int returns = -1;         // row of an excluded sensor that may be healthy again
+  double from = 0.0;        // what that read when the member began
+
+  /// Noisier samples of the IMU, for good.
+  void shake() noexcept {
+    constexpr auto kAccel = static_cast<std::size_t>(Filter::Model::kWheel + Wheels);
+    for (std::size_t i = 0; i < 3; ++i) filter.set_row_noise(i, kNoise_rad_s * kNoise_rad_s);
+    for (std::size_t i = kAccel; i < static_cast<std::size_t>(Filter::Model::kOutputs); ++i)
+      filter.set_row_noise(i, kNoise_m_s2 * kNoise_m_s2);
+  }
+  template <class Input>
+  void predict(const FaultHypothesis& h, const Input& u) noexcept {
+    filter.predict(u);
+    if (h.pushes()) filter.allow_push(kPush_N);
+    if (h.kind == FaultHypothesis::kSpin) filter.allow_spin(kSlip_rad);
+    if (h.kind == FaultHypothesis::kSlip || h.kind == FaultHypothesis::kRock) filter.allow_slip(kSlip_rad);
+    if constexpr (Wheels == 2) {
+      if (h.kind == FaultHypothesis::kRock) filter.allow_hit(kPush_N);
+    }
+  }
+  /// `event` is over and explains what was, against faults that would, too.
+  void keep(const FaultMember& event) noexcept {
+    if (!(event.ratio > std::max(ratio, 0.0))) return;
+    filter.adopt(event.filter);
+    used = event.used;
+    ratio = event.ratio;
+  }
+};
+
+}  // namespace equipoise
