@@ -91,6 +91,19 @@ def test_json_replaces_json_only(do, log, root, tmp_path):
     do(*sim, "out.json", status=0)
 
 
+def test_a_link_is_no_file(do, root, tmp_path):
+    kept = tmp_path / "kept.txt"
+    kept.write_text("kept")
+    config = ("--config", root / "config/edumip.toml", "--duration-s", "1")
+    for command in (
+        ("sim", *config, "--telemetry"),
+        ("run", "--backend", "sim", *config, "--command-url"),
+        ("send", "--disarm", "--url"),
+    ):
+        assert "a file is no link" in do(*command, f"file://{kept}?mode=w", status=2), command
+        assert kept.read_text() == "kept"
+
+
 def test_attaching_replaces_no_file(tmp_path):
     kept = tmp_path / "x.lcm"
     kept.write_bytes(b"mine")

@@ -35,6 +35,11 @@ std::string number_error(const std::string& text) {
   return "";
 }
 
+/// LCM would replace that file.
+std::string url_error(const std::string& url) {
+  return url.rfind("file:", 0) == 0 ? url + ": a file is no link; --log FILE writes one" : "";
+}
+
 CLI::Option* checked(CLI::Option* option, std::string (*error)(const std::string&)) {
   option->check(CLI::Validator(error, std::string{}));
   return option;
@@ -171,7 +176,9 @@ void Subcommand::require_subcommand() const { app_of(impl_)->require_subcommand(
 
 Option Subcommand::option(const std::string& name, std::string& value, const std::string& help) const {
   CLI::Option* option = app_of(impl_)->add_option(name, value, help);
-  return Option(name == "--json" ? checked(option, json_output_error) : option);  // before the job
+  if (name == "--json") checked(option, json_output_error);  // before the job
+  if (name == "--telemetry" || name == "--command-url" || name == "--url") checked(option, url_error);
+  return Option(option);
 }
 Option Subcommand::option(const std::string& name, double& value, const std::string& help) const {
   return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<double>));
