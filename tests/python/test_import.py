@@ -118,7 +118,7 @@ def test_a_mistake_in_the_map_is_named(root, table, tmp_path, changes, check, na
     assert named in out["by_name"][check]["text"]
 
 
-def test_shadow_of_a_healthy_run_is_quiet_and_of_a_scaled_gyro_is_not(root, table, tmp_path):
+def test_shadow_of_a_healthy_run_is_quiet_and_of_a_dead_gyro_axis_is_not(root, table, tmp_path):
     out = checks(table, write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
     healthy = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
     assert healthy["judged_s"] > 18
@@ -128,12 +128,12 @@ def test_shadow_of_a_healthy_run_is_quiet_and_of_a_scaled_gyro_is_not(root, tabl
         assert ahead["wheel"] < ahead["persistence"]["wheel"]
     assert set(healthy["nis"]) == {"gyro_x", "gyro_y", "gyro_z", "wheel_1", "wheel_2", "accel_y"}
     wrong = pd.read_csv(table)
-    wrong.loc[wrong.t > 10, "gx"] *= -1
+    wrong.loc[wrong.t > 10, "gx"] = 0
     wrong.to_csv(tmp_path / "wrong.csv", index=False)
     out = checks(tmp_path / "wrong.csv", tmp_path / "map.toml")
     faulty = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
-    alarm = faulty["alarms"][0]
-    assert 10 < alarm["t_s"] < 15 and alarm["hypothesis"] == "imu_untrusted", alarm
+    alarm = next(each for each in faulty["alarms"] if each["hypothesis"] == "imu_untrusted")
+    assert 10 < alarm["t_s"] < 10.5, alarm
     unbounded = alarm["ratio"] is None and alarm["bound"] is None  # the detector's verdict
     assert unbounded or alarm["ratio"] > alarm["bound"] > 0, alarm
 
