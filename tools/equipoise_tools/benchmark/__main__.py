@@ -136,10 +136,10 @@ def main(words: list[str] | None = None) -> int:
             return 0
         rows = benchmark(given)
         about = {**about_of(given, tuning.found()), "robots": given.robots}
-        told = score.scores(rows)
+        exact = json.dumps(score.scores(rows))
+        told = json.loads(exact, parse_float=lambda number: round(float(number), 4))
         path = given.out / "scores.json"
-        rounded = json.loads(json.dumps(told), parse_float=lambda number: round(float(number), 4))
-        lines = ",\n".join(json.dumps(row) for row in rounded)
+        lines = ",\n".join(json.dumps(row) for row in told)
         path.write_text(f'{{"about": {json.dumps(about)}, "scores": [\n{lines}\n]}}\n')
         path.with_name("benchmark.md").write_text(score.page(told, about))
         if given.write:
