@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 
 #include "equipoise/estimate/fault_hypotheses.hpp"
 #include "equipoise/estimate/used_sensors.hpp"
@@ -27,7 +28,7 @@ struct FaultMember {
 
   /// Noisier samples of the IMU, for good.
   void shake() noexcept {
-    constexpr auto kAccel = static_cast<std::size_t>(Filter::Model::kWheel + Wheels);
+    constexpr auto kAccel = static_cast<std::size_t>(Filter::Model::kWheel) + std::size_t{Wheels};
     for (std::size_t i = 0; i < 3; ++i) filter.set_row_noise(i, kNoise_rad_s * kNoise_rad_s);
     for (std::size_t i = kAccel; i < static_cast<std::size_t>(Filter::Model::kOutputs); ++i)
       filter.set_row_noise(i, kNoise_m_s2 * kNoise_m_s2);
