@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from .errors import UserError
 from .log import Log
+
+# What a log that somebody made up may come to.
+MADE_UP = ArithmeticError, LookupError, TypeError, ValueError, struct.error
 
 
 def convert(
@@ -27,11 +31,13 @@ def convert(
     try:
         log = Log(given.log)
         counts = write(log, out)
-    except (ArithmeticError, LookupError, ModuleNotFoundError, OSError, TypeError, ValueError) as error:
-        if not isinstance(error, (ModuleNotFoundError, OSError, UserError)):  # a log that somebody made up
+    except (*MADE_UP, ModuleNotFoundError, OSError) as error:
+        if not isinstance(error, (ModuleNotFoundError, OSError, UserError)):
             why = " ".join(f"{type(error).__name__}: {error}".split())
             error = UserError(f"{given.log}: no log as equipoise writes it ({why})")
-        if not there:
+        if not there and out.is_file():
+            out.unlink()
+        elif not there:
             shutil.rmtree(out, ignore_errors=True)
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -7,21 +7,9 @@ import math
 import pytest
 
 pytest.importorskip("equipoise_robot._core", reason="needs python3-dev; tools/test installs it")
-from driven import rewritten
-from equipoise_robot import lerobot, rosbag2
+from driven import every_float, rewritten
+from equipoise_robot import lerobot, mcap, rosbag2
 from equipoise_tools.cockpit.playback import Playback
-
-
-def every_float(number):
-    def change(message):
-        for name in message.__slots__:
-            value = getattr(message, name)
-            if isinstance(value, float):
-                setattr(message, name, number)
-            elif isinstance(value, (list, tuple)) and value and isinstance(value[0], float):
-                setattr(message, name, [number] * len(value))
-
-    return change
 
 
 def every(field, value):
@@ -70,12 +58,11 @@ def hostile(request, tmp_path, log):
 
 
 @pytest.mark.filterwarnings("ignore")  # of NumPy about such numbers
-@pytest.mark.parametrize("converter", [rosbag2, lerobot])
-def test_are_converted_or_refused_in_one_line(converter, hostile, tmp_path, capsys):
-    if converter is rosbag2:
-        pytest.importorskip("rosbags", reason="tools/requirements-optional.txt")
-    else:
-        pytest.importorskip("pyarrow", reason="tools/requirements-optional.txt")
+@pytest.mark.parametrize(
+    "converter, library", [(rosbag2, "rosbags"), (lerobot, "pyarrow"), (mcap, "mcap.writer")]
+)
+def test_are_converted_or_refused_in_one_line(converter, library, hostile, tmp_path, capsys):
+    pytest.importorskip(library, reason="tools/requirements-optional.txt")
     out = tmp_path / "out"
     status = converter.main([str(hostile), "--out", str(out)])
     said = capsys.readouterr().err
