@@ -140,11 +140,13 @@ def main(words: list[str] | None = None) -> int:
         told = json.loads(exact, parse_float=lambda number: round(float(number), 4))
         path = given.out / "scores.json"
         lines = ",\n".join(json.dumps(row) for row in told)
-        path.write_text(f'{{"about": {json.dumps(about)}, "scores": [\n{lines}\n]}}\n')
-        path.with_name("benchmark.md").write_text(score.page(told, about))
+        kept = f'{{"about": {json.dumps(about)}, "scores": [\n{lines}\n]}}\n'
+        page = score.page(told, about)
+        path.write_text(kept)
+        path.with_name(PAGE.name).write_text(page)
         if given.write:
-            KEPT.write_text(path.read_text())
-            PAGE.write_text(score.page(told, about))
+            KEPT.write_text(kept)
+            PAGE.write_text(page)
         print(path)
     except (UserError, OSError, ModuleNotFoundError) as error:
         print(f"error: {error}", file=sys.stderr)
