@@ -156,13 +156,13 @@ def test_what_ran_is_taken_from_the_run_not_from_the_page():
 
 def test_data_come_back_from_parquet_bit_for_bit(tmp_path):
     before = runs_of(printed=(0.1, 1 / 3), ours=(math.pi, math.nan))
-    before.traces["printed", "truth"] = np.array([0.25, -1.5])
+    before.traces["printed", "truth"] = np.array([0.25, -1.5, math.nan])
     data.write("some", before, tmp_path)
     after = data.read("some", tmp_path)
     for name in ("printed", "ours"):
         assert after.values(name, "error").tolist() == before.values(name, "error").tolist()
         assert after.ran(name, "error") == before.ran(name, "error")
-    assert after.trace("printed", "truth").tolist() == [0.25, -1.5]
+    np.testing.assert_array_equal(after.trace("printed", "truth"), before.trace("printed", "truth"))
     first = (tmp_path / "data" / "some.parquet").read_bytes()
     data.write("some", after, tmp_path)
     assert (tmp_path / "data" / "some.parquet").read_bytes() == first
