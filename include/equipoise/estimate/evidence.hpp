@@ -56,13 +56,37 @@ class Evidence {
   double expect(const Filter& f, const Sample& used, const Sample& came) noexcept {
     for (std::size_t row = 0; row < kRows; ++row) faulty_[row] = log_faulty(row, came);
     double misfit = 0.0;
-    const double density = log_density(f, used, came, &misfit);
+    const double density = log_density(f, used, came, [&](std::size_t row, double peak, double says) {
+      peak_[row] = peak;
+      misfit += peak - says;
+    });
     expected_ = density + misfit;
+    knows_less_ = !(density > kDiverged);
+    for (std::size_t row = 0; row < kRows; ++row) {
+      knows_less_ = knows_less_ || f.row_variance()[row] > kWidened * variance_[row];
+      variance_[row] = f.row_variance()[row];
+    }
     return bounded(density);
   }
+  /// expect()'s filter has lost its way, or its variances were widened: most() does not hold for those of
+  /// before.
+  bool knows_less() const noexcept { return knows_less_; }
+  /// What a filter could say of this tick at most that uses some rows of `all`, and so is surer of none: it
+  /// need not run to be refuted.
+  double most(const Sample& all, const Sample& used, const Sample& came) const noexcept {
+    double sum = kRounding;
+    for (std::size_t row = 0; row < kRows; ++row) {
+      if (!comes(came, row)) continue;
+      if (!comes(all, row)) {
+        if (comes(used, row)) return kOutlier;
+      } else {
+        sum += (comes(used, row) ? contaminated(row, peak_[row]) : faulty_[row]) - peak_[row];
+      }
+    }
+    return std::max(sum, 3.0 - kOutlier) + 0.05;  // bounded(): log(1 + exp(-3)) < 0.05
+  }
   double operator()(const Filter& f, const Sample& used, const Sample& came) const noexcept {
-    double misfit = 0.0;
-    return bounded(log_density(f, used, came, &misfit));
+    return bounded(log_density(f, used, came, [](auto&&...) {}));
   }
   /// What comes and goes from sample to sample is vibration (von Neumann 1941); the median of the gyro's
   /// axes, for one may be faulty.
@@ -115,6 +139,14 @@ class Evidence {
   static double squared(const Filter& f, std::size_t row) noexcept {
     return f.row_innovation()[row] * f.row_innovation()[row];
   }
+  /// Of the gyro's `axes`, at most.
+  static double off_rad_s(const Filter& f, const Sample& used, const std::array<bool, 3>& axes) noexcept {
+    double most = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (axes[i] && comes(used, i)) most = std::max(most, std::abs(f.row_innovation()[i]));
+    }
+    return most;
+  }
   static bool comes(const Sample& z, std::size_t row) noexcept {
     if (row < 3) return z.imu_ok && z.gyro_axis_ok[row];
     if (row < kAccelRow) return z.encoders_ok && z.wheel_ok[row - kWheelRow];
@@ -151,6 +183,9 @@ class Evidence {
   static constexpr double kMostVibration_rad_s = 0.1;  // real robots that roll
   static constexpr double kGyroRange_rad_s = 2.0;      // a faulty axis reads anything within: a body's rates
   static constexpr double kAccelRange_m_s2 = 10.0;
+  static constexpr double kDiverged = -1e6;
+  static constexpr double kWidened = 1.1;    // no tick makes it unsurer by itself
+  static constexpr double kRounding = 0.25;  // nats, and that each filter has its own Jacobians
 
   bool repeats(std::size_t row, const Sample& z) const noexcept {
     return reading(z, row) == reading(before_, row);
@@ -167,8 +202,10 @@ class Evidence {
     return log_density;
   }
 
-  /// Of the rows that came; those that are not used, as a faulty sensor has them.
-  double log_density(const Filter& f, const Sample& used, const Sample& came, double* misfit) const noexcept {
+  /// Of the rows that came; those that are not used, as a faulty sensor has them. told(row, density of no
+  /// innovation, density).
+  template <class Told>
+  double log_density(const Filter& f, const Sample& used, const Sample& came, Told&& told) const noexcept {
     double sum = 0.0;
     for (std::size_t row = 0; row < kRows; ++row) {
       if (!comes(came, row)) continue;
@@ -177,11 +214,12 @@ class Evidence {
         continue;
       }
       const double variance = spread(f, row);
-      const double normal = log_normal(squared(f, row), variance);
-      if (!(normal > -1e6)) return -1e6;  // the filter has diverged
+      const double width = std::log(2.0 * kPi * variance);
+      const double normal = -0.5 * (width + squared(f, row) / variance);
+      if (!(normal > kDiverged)) return kDiverged;
       const double density = contaminated(row, normal);
       sum += density;
-      *misfit += log_normal(0.0, variance) - density;
+      told(row, -0.5 * width, density);
     }
     return sum;
   }
@@ -200,9 +238,12 @@ class Evidence {
   }
 
   EvidenceParams p_;
-  double vibration_ = 0.0;              // variance of the gyro
-  std::array<double, 3> innovation_{};  // of the gyro, a tick ago
-  double expected_ = 0.0;               // log density of what is expected
+  double vibration_ = 0.0;                // variance of the gyro
+  std::array<double, 3> innovation_{};    // of the gyro, a tick ago
+  double expected_ = 0.0;                 // log density of what is expected
+  std::array<double, kRows> peak_{};      // of it, by row
+  std::array<double, kRows> variance_{};  // a tick ago
+  bool knows_less_ = true;
   std::array<double, kRows> faulty_{};  // log densities, of this tick
   Sample before_;                       // a tick ago
   bool known_ = false;

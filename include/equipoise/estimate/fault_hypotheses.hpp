@@ -37,6 +37,7 @@ struct FaultHypothesis {
   }
   constexpr bool healthy() const noexcept { return kind >= kSpin; }
   constexpr bool pushes() const noexcept { return kind == kPush || kind == kRock; }
+  constexpr bool waits() const noexcept { return kind == kBias || kind == kEvent; }  // to be begun
   constexpr bool wiring() const noexcept { return kind == kReversed || kind == kSwap; }
 };
 

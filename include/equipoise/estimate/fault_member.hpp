@@ -1,9 +1,11 @@
 // A hypothesis with its filter: how the samples are read if it holds, what it allows the body to do, and how
-// much likelier it is than what is used. In: input -> out: prediction. RT-safe.
+// much likelier it is than what is used. In: sample -> out: innovations, and the correction when it is
+// needed. RT-safe.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "equipoise/estimate/fault_hypotheses.hpp"
 #include "equipoise/estimate/used_sensors.hpp"
@@ -19,6 +21,8 @@ struct FaultMember {
   static constexpr double kNoise_m_s2 = 3.0;    // and 3
 
   Filter filter;
+  bool owes = false;   // its correction, which a refuted hypothesis never needs
+  bool apart = false;  // it may know more than the filter that uses every sensor
   UsedSensors<Wheels> used{};
   double ratio = 0.0;       // log-likelihood, of the hypothesis over what is used, since it was last refuted
   int since = 0;            // tick
@@ -33,9 +37,26 @@ struct FaultMember {
     for (std::size_t i = kAccel; i < static_cast<std::size_t>(Filter::Model::kOutputs); ++i)
       filter.set_row_noise(i, kNoise_m_s2 * kNoise_m_s2);
   }
-  template <class Input>
-  void predict(const FaultHypothesis& h, const Input& u) noexcept {
-    filter.predict(u);
+  template <class Sample>
+  void innovate(const Sample& z) noexcept {
+    owes = z.imu_ok || z.encoders_ok;
+    if (owes) return filter.innovate(z);
+    filter.update(z);
+  }
+  Filter& settled() noexcept {
+    if (std::exchange(owes, false)) filter.correct();
+    return filter;
+  }
+  /// What is used goes on from elsewhere, which explains `nats` of what this does.
+  void depart(double nats, double least) noexcept {
+    ratio = std::max(ratio - nats, least);
+    apart = true;
+  }
+  void refute(double to) noexcept {
+    ratio = to;
+    owes = false;
+  }
+  void allow(const FaultHypothesis& h) noexcept {
     if (h.pushes()) filter.allow_push(kPush_N);
     if (h.kind == FaultHypothesis::kSpin) filter.allow_spin(kSlip_rad);
     if (h.kind == FaultHypothesis::kSlip || h.kind == FaultHypothesis::kRock) filter.allow_slip(kSlip_rad);
@@ -44,9 +65,10 @@ struct FaultMember {
     }
   }
   /// `event` is over and explains what was, against faults that would, too.
-  void keep(const FaultMember& event) noexcept {
+  void keep(FaultMember& event) noexcept {
     if (!(event.ratio > std::max(ratio, 0.0))) return;
-    filter.adopt(event.filter);
+    filter.adopt(event.settled());
+    owes = false;
     used = event.used;
     ratio = event.ratio;
   }

@@ -79,9 +79,14 @@ class PackedFilter {
     on_core(core_, [&](auto& core) {
       on_core(other.core_, [&](const auto& from) {
         using Real = RealOf<decltype(core)>;
-        const auto to_real = [](auto v) { return static_cast<Real>(v); };
-        std::transform(from.x.begin(), from.x.end(), core.x.begin(), to_real);
-        std::transform(from.P.begin(), from.P.end(), core.P.begin(), to_real);
+        if constexpr (std::is_same_v<Real, RealOf<decltype(from)>>) {  // as bytes, not through VFP
+          core.x = from.x;
+          core.P = from.P;
+        } else {
+          const auto to_real = [](auto v) { return static_cast<Real>(v); };
+          std::transform(from.x.begin(), from.x.end(), core.x.begin(), to_real);
+          std::transform(from.P.begin(), from.P.end(), core.P.begin(), to_real);
+        }
       });
     });
     x_ = other.x_;

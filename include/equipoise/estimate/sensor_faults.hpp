@@ -39,6 +39,7 @@ class SensorFaults {
         weigh_(params.evidence),
         healthy_(with_noise(filter, params)),
         before_(healthy_),
+        predicted_(healthy_),
         members_(filled(healthy_, std::make_index_sequence<kCount>())) {
     for (std::size_t i = 0; i < 3; ++i) quiet_[i] = filter.row_noise(i);
     members_[fault_index<Wheels>(FaultHypothesis::kNoise)].shake();
@@ -62,6 +63,7 @@ class SensorFaults {
   /// One tick of `control`, which goes on without what is found faulty. `expected_rad_s`: rates of the body.
   void step(Filter& control, const Input& u, const Sample& raw, const Vec3& expected_rad_s) noexcept {
     evidence_ = {-1, 0.0, kBound, -1, 0.0, false, ticks_++ == 0 ? 0 : evidence_.verdicts};
+    ran_ = 2;
     const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
     hear_vibration(control, {});
     control.predict(u);
@@ -93,6 +95,8 @@ class SensorFaults {
   /// An encoder was found so early that it has been faulty from the start, or the robot is put down badly.
   bool while_arming() const noexcept { return used_.without_wheels != 0 && excluded_at_ <= kArmingTicks; }
   bool stood_still() const noexcept { return stood_still_; }
+  /// Filters that ran in this tick.
+  int ran() const noexcept { return ran_; }
   double ratio(std::size_t hypothesis) const noexcept { return members_[hypothesis].ratio; }
   const FaultEvidence& evidence() const noexcept { return evidence_; }
 
@@ -148,13 +152,13 @@ class SensorFaults {
     undecided_ = leads_for_ = 0;
   }
 
-  static constexpr bool waits(const FaultHypothesis& h) noexcept {
-    return h.kind == FaultHypothesis::kBias || h.kind == FaultHypothesis::kEvent;
-  }
-  void begin(std::size_t i, const Filter& from) noexcept {
+  void begin(std::size_t i, const Filter& from) noexcept { begin(i, from, from); }
+  /// `state`: that, or what it has predicted since, which is the same for all.
+  void begin(std::size_t i, const Filter& from, const Filter& state) noexcept {
     const FaultHypothesis& h = kHypotheses[i];
     Member& m = members_[i];
-    m.filter.adopt(from);
+    m.filter.adopt(state);
+    m.owes = m.apart = false;
     m.used = used_.turned_over(h);
     if (h.kind == FaultHypothesis::kSwap) m.used.swap_sign = p_.axis_sign(h.first()) * p_.axis_sign(h.last());
     const bool wheel_returns = h.kind == FaultHypothesis::kWheel && (used_.without_wheels & h.mask) != 0;
@@ -162,7 +166,7 @@ class SensorFaults {
       m.used.offset_rad(h.first()) =
           before_.wheel_angle_rad()(h.first()) - weigh_.before().wheel_angle_rad(h.first());
     if (m.used.reversed >= 0) m.used.mirror_rad = from.wheel_angle_rad()(m.used.reversed);
-    m.ratio = waits(h) ? -kMargin : 0.0;
+    m.ratio = h.waits() ? -kMargin : 0.0;
     m.since = ticks_;
     m.from_start = ticks_ <= kArmingTicks;
     m.returns = -1;
@@ -172,60 +176,62 @@ class SensorFaults {
     if (m.returns >= 0) m.from = Evidence::reading(weigh_.before(), static_cast<std::size_t>(m.returns));
   }
 
-  bool applies(const FaultHypothesis& h) const noexcept {
-    if (h.kind == FaultHypothesis::kWheel) return (used_.backwards & h.mask) == 0;
-    if (h.kind == FaultHypothesis::kSwap) return ((used_.without_axes | used_.swapped) & h.mask) == 0;
-    const bool encoders = h.kind == FaultHypothesis::kReversed || h.kind == FaultHypothesis::kWheels;
-    return !encoders || (used_.without_wheels & h.mask) == 0;
-  }
-
   void advance_all(const Input& u, const Sample& z) noexcept {
     before_.adopt(healthy_);
     hear_vibration(healthy_, p_.evidence.gyro_sigma_rad_s);
     healthy_.predict(u);
+    predicted_.adopt(healthy_);
     const Sample used = used_.of(z);
     healthy_.update(used);
     const double as_used = weigh_.expect(healthy_, used, z);
+    for (Member& m : members_) m.apart = m.apart || weigh_.knows_less();
     for (std::size_t i = 0; i < kCount; ++i) {
-      if (applies(kHypotheses[i])) advance(i, u, z, as_used);
+      if (used_.leaves_open(kHypotheses[i])) advance(i, u, z, used, as_used);
     }
     weigh_.learn_vibration(healthy_, used);
   }
 
-  void advance(std::size_t i, const Input& u, const Sample& z, double as_used) noexcept {
+  /// `all`: as healthy_ has used it.
+  void advance(std::size_t i, const Input& u, const Sample& z, const Sample& all, double as_used) noexcept {
     const FaultHypothesis& h = kHypotheses[i];
     Member& m = members_[i];
-    if (h.kind == FaultHypothesis::kBias) {
-      const Sample used = used_.of(z);
-      if (moved(used)) {
-        // What it follows already is no new jump, unless the axes that balance say so.
-        const double all = weigh_.jump(healthy_, used, {true, true, true}, kJump_rad_s);
-        const bool anew = m.ratio <= -kMargin ||
-                          weigh_.jump(healthy_, used, p_.balances, kJump_rad_s) > std::max(m.ratio, 0.0);
-        if (anew && all > -kMargin) return jumped(i, u, z, all);
-      }
+    if (h.kind == FaultHypothesis::kBias &&
+        Evidence::off_rad_s(healthy_, all, p_.balances) > least_jump_rad_s()) {
+      // A jump of the gyro's bias (Willsky and Jones 1976)? What it follows already is no new one, unless the
+      // axes that balance say so.
+      const double three = weigh_.jump(healthy_, all, {true, true, true}, kJump_rad_s);
+      const bool anew = m.ratio <= -kMargin ||
+                        weigh_.jump(healthy_, all, p_.balances, kJump_rad_s) > std::max(m.ratio, 0.0);
+      if (anew && three > -kMargin) return jumped(i, u, z, three);
     }
-    if (waits(h)) {
-      if (m.ratio <= -kMargin) return;
-    } else if (m.ratio <= -kMargin || (h.healthy() && ticks_ - m.since > kEventTicks)) {
-      if (kRocks && h.healthy()) members_[kCount - 1].keep(m);
-      begin(i, before_);
+    bool anew = m.ratio <= -kMargin;
+    if (h.waits()) {
+      if (anew) return;
+    } else {
+      anew = anew || (h.healthy() && ticks_ - m.since > kEventTicks);
+      if (kRocks && anew && h.healthy()) members_[kCount - 1].keep(m);
+      const double most = (anew ? 0.0 : m.ratio) + weigh_.most(all, m.used.of(z), z) - as_used;
+      if (most <= -kMargin && (anew || !m.apart)) return m.refute(-kMargin);
     }
+    ++ran_;
     if (h.kind != FaultHypothesis::kNoise) hear_vibration(m.filter, p_.evidence.gyro_sigma_rad_s);
-    m.predict(h, u);
+    if (anew) begin(i, before_, predicted_);
+    if (!anew) m.settled().predict(u);
+    m.allow(h);
     const Sample used = m.used.of(z);
-    m.filter.update(used);
+    m.innovate(used);
     double gain = weigh_(m.filter, used, z) - as_used;
     if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
-    m.ratio = std::max(m.ratio + gain, -kMargin);
-    if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < least_jump_rad_s()) m.ratio = -kMargin;
+    m.ratio += gain;
+    if (!(m.ratio > -kMargin)) m.refute(-kMargin);
+    if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < least_jump_rad_s()) m.refute(-kMargin);
   }
 
   /// Of the gyro's bias, on the axis that it has moved most. What is smaller the filter's own bias learns:
   /// the hypothesis would live on the freedom to do so.
-  double jump_rad_s(const Member& m) const noexcept {
+  double jump_rad_s(Member& m) const noexcept {
     Vec3 d = m.used.bias_rad_s - used_.bias_rad_s;
-    for (int k = 0; k < Filter::kBiases; ++k) d(k) += m.filter.gyro_bias(k) - healthy_.gyro_bias(k);
+    for (int k = 0; k < Filter::kBiases; ++k) d(k) += m.settled().gyro_bias(k) - healthy_.gyro_bias(k);
     return d.cwiseAbs().maxCoeff();
   }
 
@@ -233,15 +239,6 @@ class SensorFaults {
     return std::max(kLeastJump_rad_s, 3.0 * weigh_.vibration_rad_s());
   }
 
-  /// An axis that balances is off by what may be a jump of the gyro's bias (Willsky and Jones 1976).
-  bool moved(const Sample& used) const noexcept {
-    double most = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (p_.balances[i] && Evidence::comes(used, i))
-        most = std::max(most, std::abs(healthy_.row_innovation()[i]));
-    }
-    return most > least_jump_rad_s();
-  }
   void jumped(std::size_t i, const Input& u, const Sample& z, double ratio) noexcept {
     begin(i, before_);
     Member& m = members_[i];
@@ -296,7 +293,7 @@ class SensorFaults {
   }
   double weighed(std::size_t i) const noexcept {
     const FaultHypothesis& h = kHypotheses[i];
-    if (!applies(h)) return -kMargin;
+    if (!used_.leaves_open(h)) return -kMargin;
     const bool from_start = members_[i].from_start && !can_wait(h);
     if (h.wiring() && !from_start && !left_out_explains(h)) return -kMargin;
     if (h.wiring()) return members_[i].ratio - kEventPrior;
@@ -351,10 +348,10 @@ class SensorFaults {
   /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
   /// The control's filter takes a push by its own input noise; it knows of no noisier samples.
   void happened(std::size_t event, Filter& control) noexcept {
-    healthy_.adopt(members_[event].filter);
+    healthy_.adopt(members_[event].settled());
     if (!kHypotheses[event].pushes()) control.adopt(healthy_);
     const double ratio = members_[event].ratio;
-    for (Member& m : members_) m.ratio = std::max(m.ratio - ratio, -kMargin);
+    for (Member& m : members_) m.depart(ratio, -kMargin);
     begin(event, healthy_);
     undecided_ = 0;
     event_at_ = ticks_;
@@ -362,7 +359,7 @@ class SensorFaults {
 
   void use(std::size_t hypothesis) noexcept {
     const FaultHypothesis& h = kHypotheses[hypothesis];
-    const Member& m = members_[hypothesis];
+    Member& m = members_[hypothesis];
     const bool reversed = h.kind == FaultHypothesis::kReversed;
     const std::uint32_t without = reversed ? used_.without_wheels | h.mask : m.used.without_wheels;
     if ((without & ~used_.without_wheels) != 0) {
@@ -372,7 +369,7 @@ class SensorFaults {
     if (!reversed) used_ = m.used;
     if (reversed) used_.backwards |= h.mask;
     used_.without_wheels = without;
-    healthy_.adopt(m.filter);
+    healthy_.adopt(m.settled());
     if (h.kind == FaultHypothesis::kBias) ++jumps_;
     if (h.kind == FaultHypothesis::kAxis && h.mask == kAhead) rocks_at_ = ticks_;
     tell(hypothesis);
@@ -383,8 +380,9 @@ class SensorFaults {
   GrossSamples gross_;
   Evidence weigh_;
   RollWatch roll_;
-  Filter healthy_;  // with everything that is used
-  Filter before_;   // a tick ago
+  Filter healthy_;    // with everything that is used
+  Filter before_;     // a tick ago
+  Filter predicted_;  // without this tick's samples
   std::array<Member, kCount> members_;
   Used used_;
   FaultEvidence evidence_;
@@ -393,6 +391,7 @@ class SensorFaults {
   bool trusted_ = true, suspects_ = false;
   bool stood_still_ = false;   // the encoder that was excluded last
   int ticks_ = 0, jumps_ = 0;  // since arming
+  int ran_ = 1;                // filters, in this tick
   int excluded_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
   std::size_t leader_ = 0;
 };

@@ -65,6 +65,14 @@ struct UsedSensors {
     return h.kind == FaultHypothesis::kBias && !bias_rad_s.isZero(0.0);
   }
 
+  /// It says something of sensors that are used.
+  bool leaves_open(const FaultHypothesis& h) const noexcept {
+    if (h.kind == FaultHypothesis::kWheel) return (backwards & h.mask) == 0;
+    if (h.kind == FaultHypothesis::kSwap) return ((without_axes | swapped) & h.mask) == 0;
+    const bool encoders = h.kind == FaultHypothesis::kReversed || h.kind == FaultHypothesis::kWheels;
+    return !encoders || (without_wheels & h.mask) == 0;
+  }
+
   /// A hypothesis turns over what is used of its sensors: an excluded one may be healthy again.
   UsedSensors turned_over(const FaultHypothesis& h) const noexcept {
     UsedSensors u = *this;

@@ -34,7 +34,7 @@ class FaultTolerant {
   /// It finds a faulty encoder by itself.
   bool isolates() const noexcept { return params_.active == Id::kEkf; }
   /// Default filters that run: the control's, and those that look for faults; see sensor_faults.hpp.
-  int filters() const noexcept { return params_.detection ? static_cast<int>(faults_.kCount) + 2 : 1; }
+  int filters() const noexcept { return params_.detection ? faults_.ran() : 1; }
   /// Of the active estimator; only the default filter tells.
   Health health() const noexcept {
     Health h;

@@ -1,0 +1,144 @@
+// What a tick's samples say, bounded and unbounded, of filters whose innovations are told.
+#include "equipoise/estimate/evidence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "equipoise/estimate/used_sensors.hpp"
+#include "robots/mbbr/mbbr.hpp"
+
+namespace equipoise {
+namespace {
+
+using Sample = Mbbr::Sample;
+
+Sample at_rest() {
+  Sample z;
+  z.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
+  z.wheel_angle_rad = Vec3(1.0, 2.0, 3.0);
+  z.gyro_B_rad_s = Vec3(0.1, 0.2, 0.3);
+  z.imu_ok = z.encoders_ok = true;
+  return z;
+}
+
+/// A filter whose innovations are told.
+struct Told {
+  struct Model {
+    static constexpr int kOutputs = 8, kWheel = 3;
+  };
+  std::array<double, 8> innovation{}, variance{};
+  const std::array<double, 8>& row_innovation() const { return innovation; }
+  const std::array<double, 8>& row_variance() const { return variance; }
+};
+
+TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
+  using TheEvidence = Evidence<Told, 3>;
+  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.0);
+  Told filter;
+  filter.variance.fill(1e-4);
+  const Sample z = at_rest();
+  const double as_expected = evidence.expect(filter, z, z);
+  // The model's error of two sigma: 0.5 of a squared normal number in place of four.
+  filter.innovation[3] = 0.02;
+  EXPECT_NEAR(as_expected - evidence(filter, z, z), 0.5, 1e-4);
+  filter.innovation[3] = 10.0;
+  EXPECT_NEAR(as_expected - evidence(filter, z, z), TheEvidence::kOutlier, 1e-3);
+  filter.innovation[3] = NAN;
+  EXPECT_NEAR(as_expected - evidence(filter, z, z), TheEvidence::kOutlier, 1e-3);
+}
+
+TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
+  using TheEvidence = Evidence<Told, 3>;
+  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.0);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  const Sample all = at_rest();
+  for (int k = 0; k < 20000; ++k) {
+    Told everything, less;
+    Sample some = all;
+    for (bool& ok : some.gyro_axis_ok) ok = share(random) < 0.7;
+    for (bool& ok : some.wheel_ok) ok = share(random) < 0.7;
+    some.imu_ok = share(random) < 0.9;
+    for (std::size_t row = 0; row < 8; ++row) {
+      everything.variance[row] = std::pow(10.0, -6.0 + 10.0 * share(random));
+      less.variance[row] = everything.variance[row] * (share(random) < 0.5 ? 1.0 : 1.0 + 4.0 * share(random));
+      everything.innovation[row] = 3.0 * share(random) * std::sqrt(everything.variance[row]);
+      less.innovation[row] = 0.1 * everything.innovation[row];
+    }
+    evidence.expect(everything, all, all);
+    ASSERT_LE(evidence(less, some, all), evidence.most(all, some, all)) << k;
+  }
+  EXPECT_GE(evidence.most(UsedSensors<3>{}.turned_over({FaultHypothesis::kImu, 0}).of(all), all, all),
+            TheEvidence::kOutlier)
+      << "a sensor more: anything";
+}
+
+TEST(Evidence, KnowsWhenTheFilterHasBecomeLessSure) {
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.0);
+  Told filter;
+  filter.variance.fill(1e-4);
+  const Sample z = at_rest();
+  evidence.expect(filter, z, z);
+  evidence.expect(filter, z, z);
+  EXPECT_FALSE(evidence.knows_less());
+  filter.variance[4] = 1.2e-4;
+  evidence.expect(filter, z, z);
+  EXPECT_TRUE(evidence.knows_less());
+  evidence.expect(filter, z, z);
+  EXPECT_FALSE(evidence.knows_less());
+  filter.innovation[0] = NAN;
+  evidence.expect(filter, z, z);
+  EXPECT_TRUE(evidence.knows_less());
+}
+
+TEST(Evidence, AGyroThatShakesIsBelievedLess) {
+  using TheEvidence = Evidence<Told, 3>;
+  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.001);
+  std::mt19937 random(1);
+  std::normal_distribution<double> shakes(0.0, 0.05);
+  Told filter;
+  filter.variance.fill(1e-6);
+  for (int i = 0; i < 4000; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) filter.innovation[axis] = shakes(random);
+    evidence.learn_vibration(filter, at_rest());
+  }
+  EXPECT_NEAR(evidence.vibration_rad_s(), 0.05, 0.015);
+  EXPECT_NEAR(std::sqrt(evidence.spread(filter, 0)) / 2.0, evidence.vibration_rad_s(), 1e-9);
+  EXPECT_NEAR(std::sqrt(evidence.spread(filter, 4)) / 2.0, 0.001, 1e-6) << "an encoder does not shake";
+}
+
+TEST(Evidence, WhatIsOffForLongIsNoVibration) {
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.001);
+  Told filter;
+  filter.variance.fill(1e-6);
+  for (int i = 0; i < 400; ++i) {  // a bias that ramps
+    for (std::size_t axis = 0; axis < 3; ++axis) filter.innovation[axis] = 0.001 * i;
+    evidence.learn_vibration(filter, at_rest());
+  }
+  EXPECT_LT(evidence.vibration_rad_s(), 0.002);
+}
+
+TEST(Evidence, ASpikeIsNoJump) {
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.05);
+  Told filter;
+  filter.variance.fill(1e-6);
+  const Sample z = at_rest();
+  evidence.expect(filter, z, z);
+  const auto says = [&] { return evidence.jump(filter, z, {true, false, false}, 0.3); };
+  filter.innovation[0] = 0.6;  // six sigma: one sample in twenty is an outlier
+  EXPECT_GT(says(), 0.0);
+  EXPECT_LT(says(), 4.0);
+  filter.innovation[0] = 0.05;
+  EXPECT_LT(says(), 0.0) << "what is expected speaks against a jump";
+}
+
+}  // namespace
+}  // namespace equipoise
