@@ -96,7 +96,7 @@ def scan(path: Path, notes: list[str]) -> Iterator[tuple[int, str, bytes]]:
             if not skip_to_sync():
                 notes.append(f"cut off after {damaged} of {size} bytes; what precedes is used")
                 return
-            notes.append(f"{base + at - damaged} bytes at {damaged} are damaged and left out")
+            notes.append(f"{base + at - damaged} bytes at {damaged} are damaged and skipped")
 
 
 class _Channel:
@@ -288,7 +288,7 @@ class Log(dict[str, np.ndarray]):
         if not channels:
             raise UserError(f"{self.path}: is not an LCM event log, or holds no whole event")
         if crowd:
-            self.notes.append(f"more than {_MOST_CHANNELS} channels: {crowd} messages are left out")
+            self.notes.append(f"more than {_MOST_CHANNELS} channels: {crowd} messages are skipped")
         unknown: Counter[str] = Counter()
         for key, messages in channels.items():
             channel = key[0]
@@ -297,7 +297,7 @@ class Log(dict[str, np.ndarray]):
             except ValueError as error:
                 broken[key] = str(error)
             if key in broken:
-                self.notes.append(f"channel {channel} is left out: {broken[key]}")
+                self.notes.append(f"channel {channel} is skipped: {broken[key]}")
             elif records is None:
                 unknown[channel] += messages.count
             elif channel in self:
@@ -306,7 +306,7 @@ class Log(dict[str, np.ndarray]):
                 self[channel] = records
         for channel, count in unknown.items():
             self.notes.append(
-                f"channel {channel}: {count} messages of an unknown type or version are left out"
+                f"channel {channel}: {count} messages of an unknown type or version are skipped"
             )
 
 

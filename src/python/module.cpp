@@ -173,9 +173,10 @@ void def_vector(nb::class_<StateView>& state, const char* name, const char* doc)
 void bind_values(nb::module_& m) {
   nb::class_<StateView> state(m, "State", "Where the robot is: an estimate, a reference or the truth.");
   state.def(nb::init<>());
-  def_vector<&StateView::theta_rad, 3>(state, "theta_rad", "roll, pitch, yaw (MIP: lean, 0, yaw)");
+  def_vector<&StateView::theta_rad, 3>(state, "theta_rad", "roll, pitch, yaw (eduMIP: tilt, 0, yaw)");
   def_vector<&StateView::omega_B_rad_s, 3>(state, "omega_B_rad_s", "body rates");
-  def_vector<&StateView::phi_rad, 2>(state, "phi_rad", "ball angles, inertial (MIP: mean encoder angle, 0)");
+  def_vector<&StateView::phi_rad, 2>(state, "phi_rad",
+                                     "ball angles, inertial (eduMIP: mean encoder angle, 0)");
   def_vector<&StateView::phi_dot_rad_s, 2>(state, "phi_dot_rad_s", "their rates, yaw frame");
   def_vector<&StateView::position_W_m, 2>(state, "position_W_m", "where it stands");
   state.def_rw("normalized_innovation", &StateView::normalized_innovation);

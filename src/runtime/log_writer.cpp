@@ -63,7 +63,7 @@ bool LogWriter::create(const std::string& path) {
   const int fd = ::open(path.c_str(), flags, 0644);
   if (fd >= 0) fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
   if (fd < 0 && errno == ENXIO) {
-    error_ = path + ": log cannot be created: is a pipe that nobody reads";
+    error_ = path + ": log cannot be created: is a pipe without a reader";
     return false;
   }
   if (fd < 0 || ((flags & O_EXCL) != 0 && flock(fd, LOCK_EX | LOCK_NB) != 0)) {

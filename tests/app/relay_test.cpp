@@ -242,7 +242,7 @@ TEST_F(Relay, ARobotThatFallsSilentIsGone) {
   robot_.reset();
   for (int i = 0; i < 4000 && !returned_; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   ASSERT_TRUE(returned_);
-  EXPECT_EQ(error_, "mbbr is heard no more");
+  EXPECT_EQ(error_, "mbbr no longer answers");
 }
 
 TEST_F(Relay, SaysWhatTheRobotConfirmsAndEachOnce) {

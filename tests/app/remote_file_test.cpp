@@ -55,7 +55,7 @@ TEST(RemoteFile, IsReadStrictly) {
   EXPECT_THAT(refusal(kFrames + "arm = \"41\"\ndisarm = \"41\"\n"), HasSubstr("41 is disarm and arm"));
   EXPECT_THAT(refusal(kFrames + "arm = \"4142\"\ndisarm = \"41\"\n"), HasSubstr("begins with"));
   EXPECT_THAT(refusal(kFrames + "arm = \"4\"\ndisarm = \"61\"\n"), HasSubstr("hexadecimal"));
-  EXPECT_THAT(refusal(kFrames + "arm = \"41\"\ndisarm = \"61\"\nfly = \"46\"\n"), HasSubstr("fly"));
+  EXPECT_THAT(refusal(kFrames + "arm = \"41\"\ndisarm = \"61\"\njump = \"46\"\n"), HasSubstr("jump"));
   const std::string events =
       "[remote]\nkind = \"events\"\ndevice = \"/dev/input/event0\"\nspeed_m_s = 0.1\nturn_hz = 0.25\n"
       "hold_s = 2.0\n[events]\narm = \"BTN_START\"\n";

@@ -236,9 +236,9 @@ TEST_F(EventRemote, WithoutARangeItSaysWhatToWrite) {
 }
 
 /// What the loop sees.
-class Flight {
+class RemoteRun {
  public:
-  explicit Flight(const RemoteFile& file)
+  explicit RemoteRun(const RemoteFile& file)
       : remote_(open_hand(file), {file.speed_m_s, file.turn_hz, kTimeout_s, {}}) {}
 
   /// Until the command is as wanted, or five seconds.
@@ -259,19 +259,20 @@ class Flight {
   HandRemote remote_;
 };
 
-TEST_F(EventRemote, FliesAndItsLossStopsTheMotionButNotTheMotors) {
-  Flight flight(file_);
+TEST_F(EventRemote, DrivesAndItsLossStopsTheMotionButNotTheMotors) {
+  RemoteRun run(file_);
   put(EV_KEY, BTN_START, 1);
-  EXPECT_TRUE(flight.wait([](const Command& c) { return c.arm; }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return c.arm; }));
   put(EV_KEY, KEY_W, 1);
-  EXPECT_TRUE(flight.wait([](const Command& c) { return c.velocity_W_m_s.x() == 0.2; }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return c.velocity_W_m_s.x() == 0.2; }));
   unplug();
-  EXPECT_TRUE(flight.wait(
-      [](const Command& c) { return c.arm && c.velocity_W_m_s.x() == 0.0 && c.age_s > Flight::kTimeout_s; }));
+  EXPECT_TRUE(run.wait([](const Command& c) {
+    return c.arm && c.velocity_W_m_s.x() == 0.0 && c.age_s > RemoteRun::kTimeout_s;
+  }));
   plug_in();
-  EXPECT_TRUE(flight.wait([](const Command& c) { return c.age_s < Flight::kTimeout_s; }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return c.age_s < RemoteRun::kTimeout_s; }));
   put(EV_KEY, BTN_EAST, 1);
-  EXPECT_TRUE(flight.wait([](const Command& c) { return !c.arm; }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return !c.arm; }));
 }
 
 TEST_F(EventRemote, FullDeflectionIsWhatTheFileSays) {
@@ -280,17 +281,17 @@ TEST_F(EventRemote, FullDeflectionIsWhatTheFileSays) {
                            "arm = \"KEY_A\"\ndisarm = \"KEY_Q\"\nleft = \"KEY_LEFT\"\n"
                            "turn_right = \"KEY_L\"\nheading_reset = \"KEY_H\"\n",
                        "events.toml");
-  Flight flight(file_);
+  RemoteRun run(file_);
   put(EV_KEY, KEY_A, 1);
-  EXPECT_TRUE(flight.wait([](const Command& c) { return c.arm; }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return c.arm; }));
   put(EV_KEY, KEY_LEFT, 1);
-  EXPECT_TRUE(flight.wait([](const Command& c) { return c.velocity_W_m_s == Vec2(0.0, 0.2); }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return c.velocity_W_m_s == Vec2(0.0, 0.2); }));
   put(EV_KEY, KEY_L, 1);
-  EXPECT_TRUE(flight.wait([](const Command& c) { return std::abs(c.yaw_rate_rad_s + kPi) < 1e-12; }))
+  EXPECT_TRUE(run.wait([](const Command& c) { return std::abs(c.yaw_rate_rad_s + kPi) < 1e-12; }))
       << "half a turn per second, clockwise";
   put(EV_KEY, KEY_H, 1);
-  EXPECT_TRUE(flight.wait([](const Command& c) { return c.heading_reset; }));
-  EXPECT_TRUE(flight.wait([](const Command& c) { return c.arm && !c.heading_reset; }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return c.heading_reset; }));
+  EXPECT_TRUE(run.wait([](const Command& c) { return c.arm && !c.heading_reset; }));
 }
 
 TEST_F(EventRemote, WhatHappensIsSaidOnce) {

@@ -80,10 +80,10 @@ def test_separation_is_the_share_of_pairs():
 
 def test_the_imperfection_that_kills_comes_first_whatever_its_sign():
     rng = np.random.default_rng(1)
-    crooked = rng.normal(size=400)
-    drawn = {"crooked": crooked, "sticky": rng.uniform(size=400)}
-    found = influences(drawn, np.abs(crooked) > 1.5)
-    assert (found[0].name, found[0].measure) == ("crooked", "size")
+    tilted = rng.normal(size=400)
+    drawn = {"tilted": tilted, "sticky": rng.uniform(size=400)}
+    found = influences(drawn, np.abs(tilted) > 1.5)
+    assert (found[0].name, found[0].measure) == ("tilted", "size")
     assert found[0].z > 8.0
     assert abs(found[1].z) < 3.5
 

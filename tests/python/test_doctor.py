@@ -288,7 +288,7 @@ def test_a_pad_that_belongs_to_somebody_else_is_found(root, robot):
     assert checks["owner.P8.44"]["what"] == "motor 3 in1: its pad belongs to tda998x"
     assert checks["owner.P9.14"]["verdict"] == "fail"
     owners(robot, {at: name for at, name in OWNERS.items() if at != 0x9AC})
-    assert "nobody has claimed" in examine(root, robot)[0]["owner.P9.25"]["what"]
+    assert "no driver has claimed" in examine(root, robot)[0]["owner.P9.25"]["what"]
 
 
 def test_interrupts_of_the_sample_come_first(root, robot):

@@ -15,8 +15,8 @@ from equipoise_tools.estimator_comparison.filters import (
     body_rates,
     rotation,
 )
-from equipoise_tools.estimator_comparison.flights import fly, run_filter, samples_of
 from equipoise_tools.estimator_comparison.model import GROUPS, SCALE, Model, N, robot_of
+from equipoise_tools.estimator_comparison.recorded import record, run_filter, samples_of
 from scipy.stats import chi2
 
 THREE = (Extended, Unscented, ErrorState)
@@ -29,14 +29,14 @@ def config(root):
 
 
 @pytest.fixture(scope="module")
-def flight():
+def run():
     """Mild: a slow turn in the nominal world."""
-    return fly(0, 0.5, 0.1, 7.0, 3, fidelity="nominal")
+    return record(0, 0.5, 0.1, 7.0, 3, fidelity="nominal")
 
 
 @pytest.fixture(scope="module")
 def samples(config):
-    return drawn.draw(robot_of(config), flights=10, ticks=TICKS, yaw_hz=0.3, seed=5)
+    return drawn.draw(robot_of(config), runs=10, ticks=TICKS, yaw_hz=0.3, seed=5)
 
 
 def nis_of(kind, samples):
@@ -54,17 +54,17 @@ def band(samples, group, confidence=0.9999):
 def test_the_extended_filter_is_the_firmwares(config):
     """With more gyro noise than it measures: what the gyro shakes beyond it, the firmware's filter adds."""
     noise = [0.01, 0.01, 0.01, *config["estimator"]["ekf"]["r"][3:]]
-    flight = fly(0, 0.5, 0.1, 7.0, 3, settings={"estimator.ekf.r": noise}, fidelity="nominal")
-    samples = samples_of([flight])
+    run = record(0, 0.5, 0.1, 7.0, 3, settings={"estimator.ekf.r": noise}, fidelity="nominal")
+    samples = samples_of([run])
     assert np.abs(run_filter(Extended, samples).five - samples.own).max() < 1e-9
-    told_wrongly = samples_of([flight], l=0.101)
+    told_wrongly = samples_of([run], l=0.101)
     assert np.abs(run_filter(Extended, told_wrongly, 200).five - samples.own[:200]).max() > 1e-5
 
 
-def test_the_filters_agree_on_a_mild_flight(flight):
+def test_the_filters_agree_on_a_mild_run(run):
     """Once each has found the mount: the error that is left is the same one. Sigma points see what F has as
     they see it; the extended filter with a whole F shows that it is this."""
-    samples = samples_of([flight])
+    samples = samples_of([run])
     late = samples.t_s > 5.0
 
     def apart(one, other):

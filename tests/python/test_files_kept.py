@@ -161,7 +161,7 @@ def test_an_earlier_log_of_the_same_name_is_kept(do, root, tmp_path):
     assert len(list(tmp_path.glob("x.*T*Z.lcm"))) == 1 and (tmp_path / "x.lcm").exists()
 
 
-def test_a_log_that_is_deleted_in_flight_is_no_success(root, tmp_path):
+def test_a_log_that_is_deleted_during_its_run_is_no_success(root, tmp_path):
     command = [root / "build/host/equipoise", "run", "--config", root / "config/edumip.toml"]
     command += [
         "--backend",

@@ -17,7 +17,7 @@ ROBOT = {
     "env": "shift; exec $*",
     "apt-get": 'for last; do :; done; grep -q broken "$last" && exit 100; cp "$last" "$ROBOT/installed"',
     "equipoise": 'grep -q crashes "$ROBOT/installed" && exit 1; echo 0.1.0',
-    "systemctl": 'echo "$*" >>"$ROBOT/systemctl.log"; [ "$1" != is-active ] || [ -e "$ROBOT/flying" ]',
+    "systemctl": 'echo "$*" >>"$ROBOT/systemctl.log"; [ "$1" != is-active ] || [ -e "$ROBOT/running" ]',
 }
 
 
@@ -77,8 +77,8 @@ def test_a_package_that_does_not_work_is_replaced_by_the_one_before(root, robot,
     assert installed(robot) == "good"
 
 
-def test_a_flying_robot_is_left_alone(root, robot, tmp_path):
-    (robot / "flying").touch()
+def test_a_running_robot_is_left_alone(root, robot, tmp_path):
+    (robot / "running").touch()
     ended = flash(root, robot, "--package", package(tmp_path, "first"), "bone")
     assert ended.returncode == 1 and "is running" in ended.stderr
     assert not (robot / "installed").exists()

@@ -227,9 +227,18 @@ def test_words_finds_old_terms_in_pages_comments_and_identifiers(tmp_path):
         include__a_hpp="void beginFlight();\nint flight_s;\n",
         drivers__a_c='/* a run */ char key[] = "flights";\n',
         src__generated__a_cpp="// of a flight\n",
+        tests__a_test_py="def test_a_flight():\n",
+        src__b_cpp='int leans;\nask("stand it up, hands off");\nstatic_assert(a, "make room for it");\n',
     )
     found = {(f.path, f.line) for f in words.words(tree)}
-    assert found == {("docs/a.md", 2), ("src/a.cpp", 2), ("include/a.hpp", 1), ("include/a.hpp", 2)}
+    assert found == {
+        ("docs/a.md", 2),
+        ("src/a.cpp", 2),
+        ("include/a.hpp", 1),
+        ("include/a.hpp", 2),
+        ("tests/a_test.py", 1),
+        ("src/b.cpp", 2),
+    }
 
 
 def test_house_wants_headers_to_open_with_a_short_comment(tmp_path):

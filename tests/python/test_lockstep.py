@@ -66,7 +66,7 @@ def step(connection, robot, number, last=False, **changes):
     return equipoise.lockstep_motors_t.decode(connection.recv(512))
 
 
-def fly(connection, robot, steps, first=0):
+def advance(connection, robot, steps, first=0):
     for number in range(first, first + steps):
         motors = step(connection, robot, number)
         robot.advance(lockstep_client.np.array(motors.duty[:3]), motors.enable)
@@ -111,7 +111,7 @@ def test_duration_ends_the_run_with_last_and_motors_off(root, tmp_path):
     firmware = Firmware(root, tmp_path, "--duration-s", "2")
     with firmware.connect() as connection:
         robot = Robot(0.01)
-        motors = fly(connection, robot, 400)
+        motors = advance(connection, robot, 400)
         assert motors.enable
         farewell = step(connection, robot, 400)
     assert farewell.last and not farewell.enable and farewell.duty == (0.0,) * 4
@@ -123,7 +123,7 @@ def test_without_arm_the_motors_stay_off(root, tmp_path):
     firmware = Firmware(root, tmp_path, "--no-arm")
     with firmware.connect() as connection:
         robot = Robot(0.01)
-        assert not fly(connection, robot, 300).enable
+        assert not advance(connection, robot, 300).enable
         step(connection, robot, 300, last=True)
     status, summary, _ = firmware.end()
     assert (status, summary["armed"], summary["reasons"]) == (0, False, ["not_requested"])
@@ -143,7 +143,7 @@ def test_one_nan_from_the_engine_is_left_out(root, tmp_path, changes):
     firmware = Firmware(root, tmp_path)
     with firmware.connect() as connection:
         robot = Robot(0.01)
-        assert fly(connection, robot, 200).enable
+        assert advance(connection, robot, 200).enable
         motors = step(connection, robot, 200, **changes)
         assert motors.enable and all(abs(duty) <= 1.0 for duty in motors.duty)  # false of NaN
         step(connection, robot, 201, last=True)
@@ -158,7 +158,7 @@ def test_nan_for_long_stops_the_motors(root, tmp_path, changes):
     firmware = Firmware(root, tmp_path)
     with firmware.connect() as connection:
         robot = Robot(0.01)
-        assert fly(connection, robot, 200).enable
+        assert advance(connection, robot, 200).enable
         for tick in range(200, 232):  # max_missed_imu and max_missed_encoders are 30
             motors = step(connection, robot, tick, **changes)
             if not motors.enable:
@@ -173,12 +173,12 @@ def test_an_engine_that_dies_in_a_step_may_come_back(root, tmp_path):
     firmware = Firmware(root, tmp_path)
     with firmware.connect() as connection:
         robot = Robot(0.01)
-        assert fly(connection, robot, 200).enable
+        assert advance(connection, robot, 200).enable
         connection.send(robot.sensors(200).encode())  # and never reads the answer
     with firmware.connect() as connection:
         robot = Robot(0.01)
-        assert not fly(connection, robot, 50).enable  # a new trial arms anew
-        assert fly(connection, robot, 150, first=50).enable
+        assert not advance(connection, robot, 50).enable  # a new trial arms anew
+        assert advance(connection, robot, 150, first=50).enable
         step(connection, robot, 200, last=True)
     status, summary, complaint = firmware.end()
     assert (status, summary["flights"], summary["end"]) == (0, 2, "finished")
@@ -190,7 +190,7 @@ def test_an_engine_that_dies_in_a_step_may_come_back(root, tmp_path):
 def test_an_engine_that_stays_away_fails_the_job(root, tmp_path):
     firmware = Firmware(root, tmp_path, "--timeout-s", "0.5")
     with firmware.connect() as connection:
-        fly(connection, Robot(0.01), 10)
+        advance(connection, Robot(0.01), 10)
     status, summary, complaint = firmware.end()
     assert (status, summary["end"], summary["flights"]) == (1, "peer_gone", 1)
     assert "hung up before step 10; motors are off" in complaint
@@ -200,7 +200,7 @@ def test_an_engine_that_stays_away_fails_the_job(root, tmp_path):
 def test_an_engine_that_stalls_is_told_and_left(root, tmp_path):
     firmware = Firmware(root, tmp_path, "--timeout-s", "0.5")
     with firmware.connect() as connection:
-        fly(connection, Robot(0.01), 10)
+        advance(connection, Robot(0.01), 10)
         farewell = equipoise.lockstep_motors_t.decode(connection.recv(512))
         assert farewell.last and not farewell.enable
     status, summary, complaint = firmware.end()
@@ -223,7 +223,7 @@ def test_an_engine_that_stalls_is_told_and_left(root, tmp_path):
 def test_nonsense_is_answered_with_motors_off_and_a_reason(root, tmp_path, message, complaint):
     firmware = Firmware(root, tmp_path)
     with firmware.connect() as connection:
-        fly(connection, Robot(0.01), 5)
+        advance(connection, Robot(0.01), 5)
         connection.send(message)
         farewell = equipoise.lockstep_motors_t.decode(connection.recv(512))
         assert farewell.last and not farewell.enable
@@ -276,7 +276,7 @@ def test_a_full_disk_ends_the_run_with_a_whole_log(root, tmp_path):
     with firmware.connect() as connection:
         robot = Robot(0.01)
         number = 0
-        while not fly(connection, robot, 1, first=number).last:
+        while not advance(connection, robot, 1, first=number).last:
             number += 1
             assert number < 5000
     status, summary, complaint = firmware.end()

@@ -154,20 +154,20 @@ def test_a_damaged_event_is_left_out_and_reading_goes_on(tmp_path):
     path.write_bytes(data)
     log = read_log(path)
     assert log["EQUIPOISE_STATE"]["tick"].tolist() == [*range(5), *range(6, 9), *range(10, 20)]
-    assert log.notes == [f"{whole} bytes at {n * whole} are damaged and left out" for n in (5, 9)]
+    assert log.notes == [f"{whole} bytes at {n * whole} are damaged and skipped" for n in (5, 9)]
 
 
 def test_foreign_messages_are_counted_not_misread(tmp_path):
     log = read_log(small_log(tmp_path / "a.lcm", more=[("OTHER", b"12345678 something else")]))
     assert list(log) == ["EQUIPOISE_STATE"]
-    assert log.notes == ["channel OTHER: 1 messages of an unknown type or version are left out"]
+    assert log.notes == ["channel OTHER: 1 messages of an unknown type or version are skipped"]
 
 
 def test_a_message_of_wrong_length_costs_its_channel_not_the_log(tmp_path):
     torn = equipoise.state_t().encode()[:-3]
     log = read_log(small_log(tmp_path / "a.lcm", more=[("EQUIPOISE_TRUTH", torn)]))
     assert list(log) == ["EQUIPOISE_STATE"]
-    assert "EQUIPOISE_TRUTH is left out" in log.notes[0]
+    assert "EQUIPOISE_TRUTH is skipped" in log.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -199,7 +199,7 @@ def test_channels_without_end_are_left_out(tmp_path):
     more = [(f"CHANNEL_{i}", equipoise.state_t().encode()) for i in range(3000)]
     log = read_log(small_log(tmp_path / "a.lcm", more=more))
     assert log["EQUIPOISE_STATE"].size == 20 and len(log) == 200
-    assert "more than 200 channels: 2801 messages are left out" in log.notes
+    assert "more than 200 channels: 2801 messages are skipped" in log.notes
 
 
 def test_a_file_that_merely_has_the_name_of_a_part_is_none(tmp_path):

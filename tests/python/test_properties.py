@@ -24,7 +24,7 @@ same = settings(
 )
 
 
-def flown(robot, duration_s=2.0, **asked):
+def sampled(robot, duration_s=2.0, **asked):
     """Per tick: reference of ball or wheel rate, reference of body rates, tilt, wheel or ball angle, u."""
     seen = []
 
@@ -46,7 +46,7 @@ def flown(robot, duration_s=2.0, **asked):
 @example(drive_mps=-2.0, yaw_hz=0.0)
 def test_no_command_asks_for_more_than_the_governor_allows(robot, drive_mps, yaw_hz):
     radius, acceleration, yaw_acceleration = LIMITS[robot]
-    rate, body, *_ = flown(robot, drive_mps=drive_mps, yaw_hz=yaw_hz)
+    rate, body, *_ = sampled(robot, drive_mps=drive_mps, yaw_hz=yaw_hz)
     speed = radius * np.linalg.norm(rate, axis=1)
     assert speed.max() <= abs(drive_mps) + 1e-9
     assert np.abs(body[:, 2]).max() <= 2.0 * math.pi * abs(yaw_hz) + 1e-9
@@ -83,12 +83,12 @@ def test_however_sensors_and_wheels_are_mounted_the_calibration_undoes_it(robot,
         "calibration.encoder_sign": [encoder for encoder, _ in signs[:wheels]],
         "calibration.motor_sign": [motor for _, motor in signs[:wheels]],
     }
-    for straight, turned in zip(flown(robot, **asked), flown(robot, set=mounted, **asked), strict=True):
+    for straight, turned in zip(sampled(robot, **asked), sampled(robot, set=mounted, **asked), strict=True):
         np.testing.assert_allclose(turned, straight, atol=1e-6)
 
 
 def duties(root, folder, offset_counts):
-    """Of half a second of flight with encoders that start at `offset_counts`."""
+    """Of half a second of a run with encoders that start at `offset_counts`."""
     folder.mkdir(exist_ok=True)
     firmware = Firmware(root, folder)
     rad = 2.0 * math.pi / COUNTS_PER_REV * offset_counts
@@ -111,7 +111,7 @@ def test_where_the_encoders_start_does_not_matter(root, tmp_path):
 
     @given(offset=st.integers(-(2**31), 2**31 - 1))
     @settings(same, max_examples=6)
-    @example(offset=2**31 - 2)  # a 32-bit counter's end lies in the flight
+    @example(offset=2**31 - 2)  # a 32-bit counter's end lies in the run
     def starts_at(offset):
         np.testing.assert_allclose(duties(root, tmp_path / "offset", offset), from_zero, atol=1e-5)
 

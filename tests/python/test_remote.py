@@ -95,7 +95,7 @@ class App:
         self.held = None
 
 
-class Flight:
+class RemoteRun:
     """A robot in the simulated world, and what its log says while it runs."""
 
     def __init__(self, root, folder, remote):
@@ -133,20 +133,20 @@ def reference_speed(log):
 @pytest.mark.parametrize("kind", [Gamepad, App])
 def test_its_loss_ramps_to_a_stop_and_the_robot_stays_up(root, tmp_path, kind):
     remote = kind(tmp_path)
-    flight = Flight(root, tmp_path, remote)
+    run = RemoteRun(root, tmp_path, remote)
     try:
-        assert flight.wait(lambda log: len(log["EQUIPOISE_MOTORS"]["enable"]) > 200)
-        assert not newest(read_log(flight.log), "MOTORS", "enable"), "nobody has armed it"
+        assert run.wait(lambda log: len(log["EQUIPOISE_MOTORS"]["enable"]) > 200)
+        assert not newest(read_log(run.log), "MOTORS", "enable"), "nobody has armed it"
         remote.arm()
-        assert flight.wait(lambda log: newest(log, "MOTORS", "enable"))
+        assert run.wait(lambda log: newest(log, "MOTORS", "enable"))
         remote.lose() if kind is App else None  # the button is let go of before another is pressed
-        assert flight.wait(lambda log: np.allclose(newest(log, "COMMAND", "velocity_W_m_s"), 0.0))
+        assert run.wait(lambda log: np.allclose(newest(log, "COMMAND", "velocity_W_m_s"), 0.0))
         remote.forward()
-        assert flight.wait(lambda log: reference_speed(log) > 0.09)
+        assert run.wait(lambda log: reference_speed(log) > 0.09)
         remote.lose()
-        assert flight.wait(lambda log: reference_speed(log) < 1e-3)
+        assert run.wait(lambda log: reference_speed(log) < 1e-3)
     finally:
-        log, said, journal = flight.end()
+        log, said, journal = run.end()
         remote.lose()
     assert "the remote asks for the motors" in journal
     assert said["ended"] == "interrupted" and not said["fell"]

@@ -60,7 +60,7 @@ def test_own_functions_that_hand_on_what_they_get_change_nothing(robot):
     assert {k for k, v in plain.items() if estimated[k] != v} <= WALL_CLOCK | {"estimator"}
 
 
-def test_an_own_controller_flies_the_robot_and_one_that_does_nothing_lets_it_fall():
+def test_an_own_controller_balances_the_robot_and_one_that_does_nothing_lets_it_fall():
     assert eq.run("mip", controller=lambda tick: [0.0, 0.0], duration_s=3.0).fell
     seen = []
 
@@ -214,7 +214,7 @@ def test_a_policy_keeps_the_robot_up_and_none_lets_it_fall(root):
     def policy(observation):
         return np.clip(gains @ observation, -1.0, 1.0)
 
-    def flown(act):
+    def steps_of(act):
         observation, _ = env.reset(seed=1)
         rewards = []
         while True:
@@ -223,11 +223,11 @@ def test_a_policy_keeps_the_robot_up_and_none_lets_it_fall(root):
             if lost or out_of_time:
                 return rewards, lost
 
-    rewards, lost = flown(policy)
+    rewards, lost = steps_of(policy)
     assert not lost
     assert len(rewards) == 600
     assert np.mean(rewards) > 0.9
-    rewards, lost = flown(lambda observation: np.zeros(2))
+    rewards, lost = steps_of(lambda observation: np.zeros(2))
     assert lost
     assert len(rewards) < 300
     assert rewards[-1] == 0.0
@@ -289,7 +289,7 @@ def test_the_policy_that_speed_is_measured_with_keeps_all_robots_up(root, robot)
 def test_the_number_of_threads_changes_nothing(jobs):
     envs_module = pytest.importorskip("equipoise_robot.envs")
 
-    def flown(threads):
+    def observed(threads):
         envs = envs_module.BalanceVectorEnv(
             "mip", num_envs=5, max_episode_steps=30, fidelity="built2025", population=(1, 50), jobs=threads
         )
@@ -297,7 +297,7 @@ def test_the_number_of_threads_changes_nothing(jobs):
         steps = [envs.step(np.full((5, 2), 0.02))[0] for _ in range(70)]  # each is reset twice
         return np.array([first, *steps])
 
-    np.testing.assert_array_equal(flown(jobs), flown(2))
+    np.testing.assert_array_equal(observed(jobs), observed(2))
 
 
 def test_a_robot_that_cannot_be_drawn_is_named_from_whatever_thread():

@@ -1,16 +1,16 @@
-"""Tuning: what is set, what a choice costs, which designs are not flown, and who judges."""
+"""Tuning: what is set, what a choice costs, which designs are not run, and who judges."""
 
 import json
 import tomllib
 
 import pytest
 from equipoise_tools import tune
-from equipoise_tools.tuned_run import Flights, NotFlown
+from equipoise_tools.tuned_run import NotRun, Runs
 
 WORTH = {"attitude_rmse_rad": 0.005}
 
 
-def flight(error, fell=False):
+def outcome(error, fell=False):
     return {"fell": fell, "attitude_rmse_rad": None if fell else error}
 
 
@@ -36,27 +36,27 @@ def test_settings_scale_the_elements_of_each_knob_and_no_other():
 
 
 def test_a_fall_costs_more_than_any_error():
-    assert tune.cost([flight(0.005), flight(0.010)], WORTH) == pytest.approx((1.0 + 4.0) / 2)
-    assert tune.cost([flight(0.005), flight(0.0, fell=True)], WORTH) == pytest.approx(
+    assert tune.cost([outcome(0.005), outcome(0.010)], WORTH) == pytest.approx((1.0 + 4.0) / 2)
+    assert tune.cost([outcome(0.005), outcome(0.0, fell=True)], WORTH) == pytest.approx(
         (1 + tune.FALL_COSTS) / 2
     )
 
 
 def test_tunings_are_compared_robot_by_robot():
-    shipped = [flight(0.001 * i) for i in range(1, 21)]
-    tuned = [flight(0.0005 * i) for i in range(1, 20)] + [flight(0.0, fell=True)]
+    shipped = [outcome(0.001 * i) for i in range(1, 21)]
+    tuned = [outcome(0.0005 * i) for i in range(1, 20)] + [outcome(0.0, fell=True)]
     told = tune.compare(shipped, tuned, WORTH)
     assert told["ratio"]["attitude_rmse_rad"] == pytest.approx({"median": 0.5, "low": 0.5, "high": 0.5})
     assert (told["shipped"]["upright"], told["tuned"]["upright"]) == (20, 19)
 
 
-def test_a_design_that_misses_a_margin_is_not_flown(root, tmp_path):
-    flights = Flights(
+def test_a_design_that_misses_a_margin_is_not_run(root, tmp_path):
+    judged = Runs(
         root / "build/host/equipoise", root / "config/mbbr.toml", [(0.0, 0.0)], 10.0, "built2025", tmp_path
     )
-    flights.check_margins([])
-    with pytest.raises(NotFlown):
-        flights.check_margins(["controller.scheduled.design.theta_rad=0.01"])
+    judged.check_margins([])
+    with pytest.raises(NotRun):
+        judged.check_margins(["controller.scheduled.design.theta_rad=0.01"])
 
 
 def test_the_robots_that_judge_are_not_those_that_choose(capsys):

@@ -1,5 +1,5 @@
-// A simulated run that is logged as a flight is: nominal world, default estimator and controller. In: robot,
-// path of the log, plan, seed, what sees each tick's record and hands it over -> out: the log.
+// A simulated run that is logged as one on a robot is: nominal world, default estimator and controller. In:
+// robot, path of the log, plan, seed, what sees each tick's record and hands it over -> out: the log.
 #pragma once
 
 #include <string>

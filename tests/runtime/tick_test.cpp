@@ -112,9 +112,9 @@ TEST(SystemCallFilter, CatchesOne) {
   EXPECT_TRUE(WIFSIGNALED(status));
 }
 
-/// How a child ends that lets two pipelines of a robot fly.
+/// How a child ends that lets two pipelines of a robot run.
 template <class Firmware, class First, class Second>
-int status_of_flights(const std::string& estimator) {
+int status_of_runs(const std::string& estimator) {
   ClosedLoopWith<First, Firmware> first(controlled_by(estimator));
   ClosedLoopWith<Second, Firmware> second(controlled_by(estimator));
   return status_without_system_calls([&] {
@@ -137,13 +137,13 @@ TEST_P(MipTick, AllocatesNothing) {
 }
 
 TEST_P(MbbrTick, MakesNoSystemCall) {
-  const int status = status_of_flights<MbbrFirmware, MbbrScheduledPipeline, MbbrThesisPipeline>(GetParam());
+  const int status = status_of_runs<MbbrFirmware, MbbrScheduledPipeline, MbbrThesisPipeline>(GetParam());
   if (status == -1) GTEST_SKIP() << "no seccomp filters here";
   EXPECT_EQ(status, 0) << "killed by a system call in the tick";
 }
 
 TEST_P(MipTick, MakesNoSystemCall) {
-  const int status = status_of_flights<MipFirmware, MipSlcPipeline, MipLqrPipeline>(GetParam());
+  const int status = status_of_runs<MipFirmware, MipSlcPipeline, MipLqrPipeline>(GetParam());
   if (status == -1) GTEST_SKIP() << "no seccomp filters here";
   EXPECT_EQ(status, 0) << "killed by a system call in the tick";
 }

@@ -75,7 +75,7 @@ struct Faulty {
 /// Robots that were lost before: a stall of 50 ms was followed by a quarrel about the gyro; a standing eduMIP
 /// moved too little to say which of its two encoders stood still or counted backwards; one that counted
 /// backwards in a turn was taken for swapped axes of the gyro.
-TEST(RidesThrough, WhatWasTheEndBefore) {
+TEST(Tolerates, WhatWasTheEndBefore) {
   const std::vector<Faulty> faults{
       {"mbbr", "stall_50ms", "spin_driving", {405, 421, 429, 442}},
       {"edumip", "wheel_loss", "balancing", {402, 403, 404, 405, 406, 407, 408, 409}},

@@ -14,7 +14,7 @@ import threading
 import time
 
 import equipoise
-from stage import Flown, LcmWire, SerialWire, signed
+from stage import LcmWire, RunningRobot, SerialWire, signed
 
 binary, config, folder, kind = sys.argv[1:5]
 folder = pathlib.Path(folder)
@@ -62,7 +62,7 @@ def disarmed_by_message(r, holder):
 
 
 def robot(name="mbbr", *arguments, **options):
-    return Flown(binary, config, folder, name, wire.robot_url, *arguments, **options)
+    return RunningRobot(binary, config, folder, name, wire.robot_url, *arguments, **options)
 
 
 class Flood:
@@ -231,7 +231,7 @@ def two_robots():
         second = robot("second", "--robot-name", "other")
     else:  # a line each, and the attacker carries messages over
         other = SerialWire()
-        second = Flown(binary, config, folder, "second", other.robot_url)
+        second = RunningRobot(binary, config, folder, "second", other.robot_url)
         refused = none_on = True
     time.sleep(1.0)
     armed = send("anna", "--robot", "mbbr", "--arm", "--drive-mps", "0.1", "--duration-s", "1")

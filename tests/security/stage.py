@@ -1,4 +1,4 @@
-"""A stage for attacks: robots flying in a small engine, holders with `equipoise send`, and the wire between
+"""A stage for attacks: robots running in a small engine, holders with `equipoise send`, and the wire between
 them in the attacker's hands: an LCM group, which he hears and speaks on, or serial lines, which he is."""
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class SerialWire:
             os.close(fd)
 
 
-class Flown:
+class RunningRobot:
     """`equipoise run` against an engine of its own, which it thinks is its body."""
 
     def __init__(self, binary, config, folder, name, url, *arguments, tilt_rad=0.01):
@@ -157,10 +157,10 @@ class Flown:
         self.process = subprocess.Popen(command, stderr=self.said, stdout=subprocess.DEVNULL)
         self.stopped = threading.Event()
         self.upright = threading.Event()  # put there by a hand
-        self.thread = threading.Thread(target=self.fly)
+        self.thread = threading.Thread(target=self.drive)
         self.thread.start()
 
-    def fly(self):
+    def drive(self):
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         while True:
             try:

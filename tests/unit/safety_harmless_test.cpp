@@ -9,7 +9,7 @@
 namespace equipoise {
 namespace {
 
-/// At the limit, or of no concern to a robot that flies: nothing disarms, however long it lasts.
+/// At the limit, or of no concern to a robot that runs: nothing disarms, however long it lasts.
 struct Harmless {
   const char* name;
   std::function<void(SafetyInputs&, MotorCommand&)> cause;

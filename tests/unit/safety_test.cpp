@@ -203,7 +203,7 @@ TEST(Safety, RefusesToArmAndSaysWhy) {
   }
 }
 
-TEST(Safety, OneMissedSampleIsRiddenThrough) {
+TEST(Safety, OneMissedSampleIsTolerated) {
   Safety safety(params());
   SafetyInputs missed = well();
   missed.imu_ok = missed.encoders_ok = false;

@@ -60,7 +60,7 @@ def tick(_: argparse.Namespace) -> Part:
         passed, skipped = (
             len(re.findall(rf"^\[ +{how} \] .*{test}/", text, re.M)) for how in ("OK", "SKIPPED")
         )
-        measured = f"0 in {passed} test flights" + (f", {skipped} skipped" if skipped else "")
+        measured = f"0 in {passed} test runs" + (f", {skipped} skipped" if skipped else "")
         part.rows.append((what, "0", measured, None if skipped else passed > 0))
     return part
 
@@ -160,8 +160,8 @@ def commands(_: argparse.Namespace) -> Part:
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}/tools:{ROOT}/python:{BUILD}/lcm/python"}
     part = Part()
     with tempfile.TemporaryDirectory() as folder:
-        flight = (sys.executable, ROOT / "tests/python/command_run.py", BINARY, ROOT / "config/mbbr.toml")
-        told = json.loads(output(*isolated(*flight, folder), env=environment))
+        run = (sys.executable, ROOT / "tests/python/command_run.py", BINARY, ROOT / "config/mbbr.toml")
+        told = json.loads(output(*isolated(*run, folder), env=environment))
     measured = f"{told['attacks']} sent, {told['accepted']} accepted"
     holds = told["attacks"] >= 1000 and told["accepted"] == 0
     part.rows.append(("forged and replayed commands, LCM", "1000 sent, 0 accepted", measured, holds))
@@ -207,9 +207,9 @@ def blackbox(_: argparse.Namespace) -> Part:
         holds = bool(rows) and int(rows[0][0]) >= wanted and float(rows[0][2]) <= 100.0
         part.rows.append((what, f"{wanted} readable logs, ≤ 100 ms lost", measured, holds))
     replayed = re.search(r"(\d+) passed", pytest_output("test_blackbox", "replays_bit_for_bit"))
-    flights = int(replayed[1]) if replayed else 0
+    scenarios = int(replayed[1]) if replayed else 0
     part.rows.append(
-        ("bit-exact replay", "every scenario", f"{flights} scenarios, all identical", flights > 0)
+        ("bit-exact replay", "every scenario", f"{scenarios} scenarios, all identical", scenarios > 0)
     )
     return part
 
@@ -293,8 +293,8 @@ HOLDS = {True: "yes", False: "**no**", None: "skipped: no evidence here"}
 HEAD = """# Reliability
 Written by `tools/reliability`{arguments}, {cpus} CPUs, kernel {kernel}. Faults enter at the hardware
 boundary (src/app/io/fault_backend.hpp), in simulated time, world of nominal fidelity, default estimator and
-controller. Unsafe is: duty after the deadline of the fault, motors on while lying, a wrong tilt that nobody
-notices, faster than 0.6 m/s or half a metre of unasked travel with motors on, motors off without a reason,
+controller. Unsafe is: duty after the deadline of the fault, motors on after a fall, a wrong tilt that is not
+noticed, faster than 0.6 m/s or half a metre of unasked travel with motors on, motors off without a reason,
 arming by itself: judged in every tick by the plant's truth (src/app/evaluate/fault_run.hpp). Ticks are 5 ms,
 count from the first spoilt one. Times are of this machine, not of a BeagleBone. Which one-token changes of
 this code the tests notice: [mutation testing](mutation.md).

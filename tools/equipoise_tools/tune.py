@@ -1,7 +1,7 @@
 """Noise and weights tuned by Optuna on training robots, reported on others; see tools/tune --help.
 
-A choice is judged by simulated flights alone: a fall costs more than any error, and weights whose loop
-misses the margins of `equipoise design` are not flown at all.
+A choice is judged by simulated runs alone: a fall costs more than any error, and weights whose loop
+misses the margins of `equipoise design` are not run at all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from .campaign import RUNS, pair
 from .campaign_statistics import quantile_interval, wilson
 from .paths import UserError, binary, repository_root
-from .tuned_run import Flights, NotFlown
+from .tuned_run import NotRun, Runs
 
 FALL_COSTS = 100.0
 # An error that costs 1: what docs/as-built.md aims at for the median robot.
@@ -119,7 +119,7 @@ def compare(shipped: list[dict], tuned: list[dict], worth: dict[str, float]) -> 
     return out
 
 
-def study(given: argparse.Namespace, flights: Flights, config: dict, robot: str):
+def study(given: argparse.Namespace, judged: Runs, config: dict, robot: str):
     import optuna
 
     knobs = KNOBS[robot]
@@ -129,14 +129,14 @@ def study(given: argparse.Namespace, flights: Flights, config: dict, robot: str)
         factors = {knob.name: trial.suggest_float(knob.name, knob.low, knob.high, log=True) for knob in knobs}
         words = settings(config, knobs, factors)
         try:
-            flights.check_margins(words)
-        except NotFlown as reason:
-            trial.set_user_attr("not_flown", str(reason))
+            judged.check_margins(words)
+        except NotRun as reason:
+            trial.set_user_attr("not_run", str(reason))
             raise optuna.TrialPruned from reason
-        return cost(flights.fly(training, words), WORTH[robot])
+        return cost(judged.run(training, words), WORTH[robot])
 
     def show(done, trial) -> None:
-        what = f"cost {trial.value:.4f}" if trial.value is not None else trial.user_attrs.get("not_flown", "")
+        what = f"cost {trial.value:.4f}" if trial.value is not None else trial.user_attrs.get("not_run", "")
         best = f"{done.best_value:.4f}" if done.best_trials else "none"
         print(f"{trial.number + 1}/{given.trials}: {what}; best {best}", file=sys.stderr, flush=True)
 
@@ -157,8 +157,8 @@ def page(told: dict) -> str:
     errors = list(WORTH[told["robot"]])
     lines = [
         f"# Tuning of the {told['robot']}: noise and weights by Optuna",
-        f"Written by `tools/tune`. {told['trials']} choices, {told['not_flown']} of which have",
-        "less margin than aimed at and than the shipped one and were not flown;",
+        f"Written by `tools/tune`. {told['trials']} choices, {told['not_run']} of which have",
+        "less margin than aimed at and than the shipped one and were not run;",
         f"the others by the training robots 1 to {told['training']} at",
         f"{told['points']}, {told['duration_s']:g} s, world `{told['fidelity']}`.",
         "Cost: mean squared error over "
@@ -245,11 +245,11 @@ def main(words: list[str] | None = None) -> int:
         if robot not in KNOBS:
             raise UserError(f"{path}: robot.type {robot!r}: the knobs of {', '.join(KNOBS)} are known")
         with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
-            flights = Flights(binary(), path, given.runs, given.duration_s, given.fidelity, Path(folder))
-            done = study(given, flights, config, robot)
+            judged = Runs(binary(), path, given.runs, given.duration_s, given.fidelity, Path(folder))
+            done = study(given, judged, config, robot)
             words_of_best = settings(config, KNOBS[robot], done.best_params)
             judges = range(given.first_held_out, given.first_held_out + given.held_out)
-            held = compare(flights.fly(judges, []), flights.fly(judges, words_of_best), WORTH[robot])
+            held = compare(judged.run(judges, []), judged.run(judges, words_of_best), WORTH[robot])
     except (UserError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -259,7 +259,7 @@ def main(words: list[str] | None = None) -> int:
     told = {
         "robot": robot,
         "trials": len(done.trials),
-        "not_flown": sum(trial.value is None for trial in done.trials),
+        "not_run": sum(trial.value is None for trial in done.trials),
         "training": given.training,
         "points": ", ".join(f"({yaw:g} Hz, {drive:g} m/s)" for yaw, drive in given.runs),
         "duration_s": given.duration_s,

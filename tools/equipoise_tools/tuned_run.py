@@ -1,4 +1,4 @@
-"""Flights of a choice of parameters: `equipoise design` says if it may fly, `equipoise trials` flies it."""
+"""Runs of a choice of parameters: `equipoise design` says if it may run, `equipoise trials` runs it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ PHASE_DEG = {"u": 40.0, "gyro": 40.0, "encoder": 35.0}
 GAIN_DB = 6.0
 
 
-class NotFlown(Exception):
+class NotRun(Exception):
     """The design was refused, or misses a margin."""
 
 
-class Flights:
+class Runs:
     def __init__(
         self,
         program: Path,
@@ -42,10 +42,10 @@ class Flights:
         return [word for text in settings for word in ("--set", text)]
 
     def margins(self, settings: list[str]) -> dict[str, tuple[float, float]]:
-        """Smallest phase and gain margin of each channel; NotFlown when the design is refused."""
+        """Smallest phase and gain margin of each channel; NotRun when the design is refused."""
         done = self._told("design", "--config", self.config, *self._set(settings), "--json", "-")
         if done.returncode != 0:
-            raise NotFlown(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "design refused")
+            raise NotRun(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "design refused")
         found = {}
         rows = [row["margins"] for row in json.loads(done.stdout)["rows"] if row["yaw_hz"] <= 3.0]
         for channel in PHASE_DEG:
@@ -58,17 +58,17 @@ class Flights:
         return found
 
     def check_margins(self, settings: list[str]) -> None:
-        """NotFlown when a margin is below its aim and below the shipped design's."""
+        """NotRun when a margin is below its aim and below the shipped design's."""
         if self._shipped is None:
             self._shipped = self.margins([])
         for channel, (phase_deg, gain_dB) in self.margins(settings).items():
             had_deg, had_dB = self._shipped[channel]
             if phase_deg < min(PHASE_DEG[channel], had_deg):
-                raise NotFlown(f"{phase_deg:.1f} degrees at {channel}")
+                raise NotRun(f"{phase_deg:.1f} degrees at {channel}")
             if gain_dB < min(GAIN_DB, had_dB):
-                raise NotFlown(f"{gain_dB:.1f} dB at {channel}")
+                raise NotRun(f"{gain_dB:.1f} dB at {channel}")
 
-    def fly(self, robots: range, settings: list[str]) -> list[dict]:
+    def run(self, robots: range, settings: list[str]) -> list[dict]:
         """Every robot at every point, in order."""
         trials = [
             {"robot": robot, "yaw_hz": yaw, "drive_mps": drive, **self.common}

@@ -153,7 +153,7 @@ def view(source: lcm.LCM, url: str, once: bool, seconds: float) -> int:
             print("\x1b[H\x1b[2J" + "\n".join(panel(latest, rates_hz, url)), flush=True)
     if not latest.messages:
         print(
-            f"error: no Equipoise telemetry heard on {url}; is equipoise running with --telemetry?",
+            f"error: no Equipoise telemetry on {url}; is equipoise running with --telemetry?",
             file=sys.stderr,
         )
         return 1

@@ -43,7 +43,7 @@ std::string self_test(const rio_t& io) {
   if (battery < kTicks) return "the battery voltage cannot be read; check [battery]";
   // 4096 counts per g at the boundary: held by hand or on its stand, the robot feels about one g.
   if (force < 0.5 * 4096.0 || force > 2.0 * 4096.0)
-    return "the accelerometer does not feel gravity; check [imu] accel_range_g and the mounting";
+    return "the accelerometer does not measure gravity; check [imu] accel_range_g and the mounting";
   return "";
 }
 

@@ -50,7 +50,7 @@ std::vector<WheelFinding> pulse_wheels(Commissioning& commissioning) {
 
 CalibrationFile measure_gyro(Commissioning& commissioning) {
   const auto manual = commissioning.open();
-  manual->ask({Request::kUpright, "put the robot down, hands off, then press Enter"});
+  manual->ask({Request::kUpright, "put the robot down, do not touch it, then press Enter"});
   const Stillness still = manual->hold_still(3.0);
   const GyroBias bias = gyro_bias(still, commissioning.calibration());
   CalibrationFile file;

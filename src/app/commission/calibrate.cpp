@@ -65,7 +65,7 @@ Result calibrate_accel(Commissioning& commissioning, CalibrationFile* file, nloh
     manual->ask({Request::kFaceUp,
                  std::string("put the robot down with the IMU's ") +
                      kFaceNames[static_cast<std::size_t>(next)] +
-                     " side up (or any other side not seen yet), hands off, then press Enter",
+                     " side up (or any other side not seen yet), do not touch it, then press Enter",
                  next});
     const Vec3 accel = pose(*manual, commissioning.calibration(), &temperature);
     const int face = face_up(accel);
@@ -81,7 +81,7 @@ Result calibrate_accel(Commissioning& commissioning, CalibrationFile* file, nloh
   }
   Vec3 check = Vec3::UnitX() * kGravity_m_s2;
   if (poses.size() == seen.size()) {
-    manual->ask({Request::kTip, "lean the robot against something, on no side, then press Enter"});
+    manual->ask({Request::kTip, "prop the robot against something, on no side, then press Enter"});
     check = pose(*manual, commissioning.calibration(), &temperature);
   }
   const AccelFit fit = fit_six_faces(poses, check);
@@ -108,9 +108,9 @@ Result calibrate_mount(Commissioning& commissioning, CalibrationFile* file, nloh
   const auto corrected = [&](const Vec3& a) {
     return file->accel ? Vec3(file->accel->scale.cwiseProduct(a) - file->accel->bias_m_s2) : a;
   };
-  manual->ask({Request::kUpright, "stand the robot exactly upright, hands off, then press Enter"});
+  manual->ask({Request::kUpright, "stand the robot exactly upright, do not touch it, then press Enter"});
   const Vec3 upright = corrected(pose(*manual, commissioning.calibration(), &temperature));
-  manual->ask({Request::kTip, commissioning.tip_words() + ", lean it there, then press Enter"});
+  manual->ask({Request::kTip, commissioning.tip_words() + ", prop it there, then press Enter"});
   const Vec3 tipped = corrected(pose(*manual, commissioning.calibration(), &temperature));
   const Mat3 R_BS = mount_rotation(upright, tipped, commissioning.setup().tip_axis_B);
   file->mount = {stamp_of(temperature), R_BS};

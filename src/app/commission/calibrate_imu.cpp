@@ -28,12 +28,12 @@ GyroBias gyro_bias(const Stillness& still, const Calibration& scale) {
   if (sigma > kStillSigma_rad_s || drift > kStillDrift_rad_s) {
     throw JobError(
         format("the robot moved: %.2f deg/s of shaking (allowed %.2f), %.2f deg/s of change "
-               "(allowed %.2f); put it down and keep hands off",
+               "(allowed %.2f); put it down and do not touch it",
                sigma * degrees, kStillSigma_rad_s * degrees, drift * degrees, kStillDrift_rad_s * degrees));
   }
   for (std::size_t i = 0; i < kMaxMotors; ++i) {
     if (still.encoder_travel[i] > 1.0)
-      throw JobError(format("wheel %d turned by %.0f counts; keep hands off", static_cast<int>(i) + 1,
+      throw JobError(format("wheel %d turned by %.0f counts; do not touch the robot", static_cast<int>(i) + 1,
                             still.encoder_travel[i]));
   }
   GyroBias bias{k * still.gyro, k * still.gyro_sigma};

@@ -205,7 +205,7 @@ void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFin
     if (f.wheel && f.turns_backwards) continue;
     std::string question = format("motor %d moved encoder %d", f.motor + 1, f.encoder + 1);
     question += f.wheel ? "" : "; which turned, " + layout.name(0) + " to " + layout.name(layout.wheels - 1);
-    question += f.turns_backwards ? ", first forwards or backwards (already felt; f)"
+    question += f.turns_backwards ? ", first forwards or backwards (already measured; f)"
                                   : ", and which way first: forwards or backwards (f, b)";
     const std::string answer = manual.ask(
         {Request::kLookAtWheel, question + "? e.g. \"" + std::to_string(f.motor + 1) + " f\"", f.motor});
@@ -297,7 +297,7 @@ std::string describe(const WheelFinding& f) {
                             100.0 * f.drive, f.encoder + 1, f.counts_down ? "down" : "up");
   text += f.wheel ? format(", wheel %d", *f.wheel + 1) : ", wheel unknown";
   if (f.turns_backwards) text += *f.turns_backwards ? " turns backwards" : " turns forwards";
-  return text + format(" (felt by the gyro: %.0f sigma)", f.kick_sigmas);
+  return text + format(" (seen by the gyro: %.0f sigma)", f.kick_sigmas);
 }
 
 std::string complaint(const std::vector<WheelFinding>& findings) {

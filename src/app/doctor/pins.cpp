@@ -257,7 +257,7 @@ void examine_owner(const Patient& patient, Findings* findings, const Use& use, c
   if (use.owner.empty() || use.owner.front() == '/') return;
   const std::string name = "owner." + pad.pin;
   if (found == owners.end()) {
-    findings->warn(name, use.use + ": nobody has claimed its pad", overlay_fix(patient));
+    findings->warn(name, use.use + ": no driver has claimed its pad", overlay_fix(patient));
   } else if (found->second.find(use.owner) == std::string::npos) {
     findings->fail(name, use.use + ": its pad belongs to " + found->second, overlay_fix(patient));
   }

@@ -42,7 +42,7 @@ class FaultJudge {
     lying_ = on && truth.theta_rad.head<2>().norm() > max_tilt_rad_ ? lying_ + 1 : 0;
     const double error = (seen.theta_rad - truth.theta_rad).head<2>().norm();
     wrong_ = on && !(error < kWrongTilt_rad) ? wrong_ + 1 : 0;
-    if (lying_ > kDeadlineTicks) unsafe("motors on while lying");
+    if (lying_ > kDeadlineTicks) unsafe("motors on after a fall");
     if (wrong_ > kDeadlineTicks) unsafe("wrong tilt unnoticed");
     const bool must_be_off = info.deadline_ticks > 0 && (struck_while_on_ || !info.once);
     if (on && active && must_be_off && since >= info.deadline_ticks) unsafe("duty after the deadline");

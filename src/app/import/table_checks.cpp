@@ -30,7 +30,7 @@ namespace {
 Check check_rows(const Table& table) {
   const std::size_t torn = table.torn_rows;
   return {"rows", torn * 100 <= table.rows(), static_cast<double>(torn),
-          format("%zu rows; %zu with another number of cells are left out", table.rows(), torn)};
+          format("%zu rows; %zu with another number of cells are skipped", table.rows(), torn)};
 }
 
 Series steps(const Series& t_s) {
@@ -47,7 +47,7 @@ Check check_clock(const ImportedRows& rows) {
           format("%.1f rows a second, longest step %.1f ms", 1.0 / usual, 1e3 * late)};
   c.ok = rows.not_advancing == 0 && usual > 1e-5 && usual < 0.1;
   if (rows.not_advancing > 0)
-    c.text += format("; %zu rows whose time does not advance are left out", rows.not_advancing);
+    c.text += format("; %zu rows whose time does not advance are skipped", rows.not_advancing);
   if (usual >= 0.1) c.text += "; too slow for balancing: is time.unit ms or us?";
   if (usual <= 1e-5) c.text += "; too fast for a control loop: is time.unit s or ms?";
   return c;

@@ -106,7 +106,7 @@ void print(std::FILE* out, const ReplayArguments& a, const runtime::RunInfo& run
     std::fprintf(out, "  %lld ticks are missing; what follows them cannot be the same\n",
                  static_cast<long long>(r.missing));
   }
-  if (r.damaged_bytes > 0) std::fprintf(out, "  %zu bytes are damaged and left out\n", r.damaged_bytes);
+  if (r.damaged_bytes > 0) std::fprintf(out, "  %zu bytes are damaged and skipped\n", r.damaged_bytes);
   if (r.difference.found) {
     std::fprintf(out, "  DIFFERS first at tick %lld: %s: logged %s, replayed %s\n",
                  static_cast<long long>(r.difference.tick), r.difference.field.c_str(),

@@ -77,7 +77,7 @@ struct Port : NoCopy {
 bool learn_action(Port& port, HandAction action, double wait_s, std::vector<FrameBinding>* frames) {
   const LearntButton learnt = learn_button(port.listen(wait_s));
   if (learnt.frame.empty()) {
-    std::fprintf(stderr, "  nothing came: left out\n");
+    std::fprintf(stderr, "  nothing came: skipped\n");
     return true;
   }
   std::vector<FrameBinding> with = *frames;
@@ -94,7 +94,7 @@ bool learn_action(Port& port, HandAction action, double wait_s, std::vector<Fram
     return false;
   }
   std::fprintf(stderr, "  %s%s%s\n", to_hex(learnt.frame).c_str(),
-               learnt.released.empty() ? "" : ", let go: ", to_hex(learnt.released).c_str());
+               learnt.released.empty() ? "" : ", released: ", to_hex(learnt.released).c_str());
   *frames = with;
   return true;
 }
@@ -129,7 +129,7 @@ int learn(const LearnArguments& a) {
   for (std::size_t i = 0; i < kHandActions.size(); ++i) {
     constexpr int kTries = 3;
     for (int tried = 1;; ++tried) {
-      std::fprintf(stderr, "Hold the button for %s for two seconds, then let go (none: Enter)\n",
+      std::fprintf(stderr, "Hold the button for %s for two seconds, then release it (none: Enter)\n",
                    kHandActions[i]);
       if (learn_action(port, static_cast<HandAction>(i), a.wait_s, &frames)) break;
       if (tried == kTries) throw JobError(std::string(kHandActions[i]) + ": not learnt; nothing was written");

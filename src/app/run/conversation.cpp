@@ -65,9 +65,9 @@ void Conversation::find_robots() {
   for (const auto limit = after(a_.timeout_s); sender_.links().empty(); listen(0.0)) {
     if (Clock::now() < limit && !interrupted.load()) continue;
     if (sender_.deaf())
-      throw std::runtime_error("a robot is heard on " + a_.url +
+      throw std::runtime_error("a robot answers on " + a_.url +
                                ", but it has not the same key; has that been rotated?");
-    fail("is not heard on " + a_.url + " (it needs equipoise run --command-key FILE)");
+    fail("does not answer on " + a_.url + " (it needs equipoise run --command-key FILE)");
   }
   if (a_.disarm) return;  // at once
   listen(kOthers_s);

@@ -163,7 +163,7 @@ void Conversation::relay(int requests) {
     if (sender_.links().size() > 1) fail("has started anew, or there are two of that name");
     if (robot().heard_ms != heard_ms) heard_at = Clock::now();
     heard_ms = robot().heard_ms;
-    if (Clock::now() > heard_at + patience) fail("is heard no more");
+    if (Clock::now() > heard_at + patience) fail("no longer answers");
     std::vector<LiveRequest> requested;
     read_requests(&requested);
     listen(0.0);  // and sees whether it was stopped

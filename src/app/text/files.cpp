@@ -43,7 +43,7 @@ std::string read_text(const std::string& path) {
 
 std::string output_error(const std::string& path, const std::vector<std::string>& beginnings,
                          const std::string& kind) {
-  if (is_unread_pipe(path)) return path + ": is a pipe that nobody reads";
+  if (is_unread_pipe(path)) return path + ": is a pipe without a reader";
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return "";
   std::ifstream file(path, std::ios::binary);

@@ -222,7 +222,7 @@ TEST_P(EveryImu, InATickOnlyTheDriversCallTheKernelAndNothingSleeps) {
 }
 
 // Its memory is locked: what another process takes away is not its own.
-TEST_P(ClosedLoop, FliesOnWhileAnotherProcessTakesAllMemory) {
+TEST_P(ClosedLoop, GoesOnWhileAnotherProcessTakesAllMemory) {
   balance(kTicksPerSecond);
   const pid_t hog = fork();
   if (hog == 0) takeAllMemory();

@@ -10,7 +10,7 @@ namespace {
 
 using Model = MbbrEkfModel;
 
-/// A robot that stands upright and turns evenly, seen by a crooked IMU beside its axis.
+/// A robot that stands upright and turns evenly, seen by a misaligned IMU beside its axis.
 struct Turning {
   MbbrConfig config;
   Vec2 mount{0.02, -0.03};

@@ -80,7 +80,7 @@ TEST(MipEkfModel, SeesTheCentripetalAccelerationOfItsLeverArm) {
   EXPECT_NEAR(y(M::kAccelY), 0.0, 1e-12);
 }
 
-/// A robot that stands upright and begins to turn, seen by a crooked IMU; the wheels turn by
+/// A robot that stands upright and begins to turn, seen by a misaligned IMU; the wheels turn by
 /// `wheel_scale` more than track and radius say.
 MipEkf turned(const MipConfig& config, const Vec3& mount, double wheel_scale) {
   const Mat3 R_mount = Eigen::AngleAxisd(mount.norm(), mount.normalized()).toRotationMatrix();

@@ -97,7 +97,7 @@ def tune(given: argparse.Namespace) -> None:
             for peer in given.peers:
                 size = given.budget, given.training, given.fidelity
                 if tuning.knobs_of(PEERS[peer], kind):
-                    tuning.write(told, kind, peer, tuning.search(kind, peer, *size, workers.fly))
+                    tuning.write(told, kind, peer, tuning.search(kind, peer, *size, workers.run))
 
 
 def arguments(words: list[str] | None) -> argparse.Namespace:

@@ -38,7 +38,7 @@ def search(
     budget: int,
     robots: int,
     fidelity: str,
-    fly: Callable[[list, str, Factors], list[dict]],
+    run: Callable[[list, str, Factors], list[dict]],
 ) -> dict:
     """The best of `budget` choices; the first is the designer's."""
     import optuna
@@ -48,7 +48,7 @@ def search(
 
     def objective(trial) -> float:
         factors = {name: trial.suggest_float(name, *bounds, log=True) for name, bounds in knobs.items()}
-        rows = fly(trials, fidelity, factors)
+        rows = run(trials, fidelity, factors)
         value = sum(map(cost, rows)) / len(rows)
         print(f"{kind} {peer} {trial.number + 1}/{budget}: cost {value:.4f}", file=sys.stderr, flush=True)
         return value

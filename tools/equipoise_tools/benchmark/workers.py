@@ -31,5 +31,5 @@ class Workers:
     def rows(self, jobs: list[tuple[runs.Trial, str, Factors]]) -> Iterator[dict]:
         return self.pool.imap_unordered(work, jobs, chunksize=4)
 
-    def fly(self, trials: list[runs.Trial], fidelity: str, factors: Factors) -> list[dict]:
+    def run(self, trials: list[runs.Trial], fidelity: str, factors: Factors) -> list[dict]:
         return list(self.rows([(trial, fidelity, factors) for trial in trials]))

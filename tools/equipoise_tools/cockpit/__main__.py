@@ -54,7 +54,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         default=repository_root() / "logs",
         help="to play and record (default: logs)",
     )
-    parser.add_argument("--fly", action="store_true", help="arm the simulated robot once, at the start")
+    parser.add_argument("--arm", action="store_true", help="arm the simulated robot once, at the start")
     parser.add_argument(
         "run", nargs="*", metavar="RUN OPTION", help="after --: options of equipoise run --backend sim"
     )
@@ -63,8 +63,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         raise UserError(
             "--key, --command-url and --as go with --telemetry; a simulated robot has a key of its own"
         )
-    if options.telemetry is not None and options.fly:
-        raise UserError("--fly: only a simulated robot is armed by a program")
+    if options.telemetry is not None and options.arm:
+        raise UserError("--arm: only a simulated robot is armed by a program")
     if options.telemetry is not None and options.run:
         raise UserError(f"{options.run[0]}: an attached robot is running already")
     if options.config is None and (options.telemetry is None or options.robot):
@@ -116,7 +116,7 @@ async def serve(options: argparse.Namespace) -> int:
             if cockpit.remote is not None:
                 cockpit.remote.start()
             watch = asyncio.create_task(cockpit.watch())
-            if options.fly:
+            if options.arm:
                 await cockpit.remote.first_status()
                 cockpit.remote.say("arm")
             print(f"Open http://127.0.0.1:{cockpit.port}/#{cockpit.token}   (Ctrl-C ends)", flush=True)

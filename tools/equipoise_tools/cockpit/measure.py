@@ -1,6 +1,6 @@
 """python -m equipoise_tools.cockpit.measure: what the cockpit costs on this machine, as JSON.
 
-Starts a cockpit with a flying robot and a Chromium without a window (its GPU is the processor), drives, and
+Starts a cockpit with a running robot and a Chromium without a window (its GPU is the processor), drives, and
 measures for a while. Needs playwright (tools/requirements-optional.txt) and chromium.
 """
 
@@ -49,7 +49,7 @@ def measure(seconds: float, width: int, height: int, arguments: list[str]) -> di
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError:
         raise UserError("playwright is not installed: tools/requirements-optional.txt") from None
-    command = [sys.executable, "-m", "equipoise_tools.cockpit", "--port", "0", "--fly", *arguments]
+    command = [sys.executable, "-m", "equipoise_tools.cockpit", "--port", "0", "--arm", *arguments]
     cockpit = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         link = re.search(r"http://\S+", cockpit.stdout.readline())

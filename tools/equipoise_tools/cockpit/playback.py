@@ -23,7 +23,7 @@ class Playback:
     def __init__(self, path: Path) -> None:
         self.log: Log = read_log(path)
         if names.STATE not in self.log:
-            raise UserError(f"{path.name}: no channel {names.STATE}: not the log of a flight")
+            raise UserError(f"{path.name}: no channel {names.STATE}: not the log of a run")
         self.channels = [c for c in CHANNELS if c in self.log and self.log[c].dtype.names]
         self._ticks = {channel: self.log[channel]["tick"] for channel in self.channels}
         self._t_s = self.log.seconds(names.STATE)

@@ -24,7 +24,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--first", type=int, default=2101, help="robot of the population")
     parser.add_argument("--robots", type=int, default=20)
-    parser.add_argument("--duration", type=float, default=60.0, help="seconds of each flight")
+    parser.add_argument("--duration", type=float, default=60.0, help="seconds of each run")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--from-data", action="store_true", help="no runs: from the data")
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""Three filters of one model and one noise, each over many flights at once: extended, unscented, error-state.
+"""Three filters of one model and one noise, each over many runs at once: extended, unscented, error-state.
 
 A step is predict(u) and update(u, y, use); x holds the model's states, heading_rad what the yaw rate adds
 up to. nu: innovations, whitened in the order of the rows, so that their squares are the firmware's row_nis().
@@ -95,13 +95,13 @@ class Unscented(Extended):
         self.weight[0] = self.mean_weight[0] + 1.0 - self.alpha**2 + self.beta
 
     def _points(self) -> np.ndarray:
-        """(states, points, flights)"""
+        """(states, points, runs)"""
         away = self.reach * np.linalg.cholesky(self.P).transpose(1, 2, 0)
         x = self.x[:, None]
         return np.concatenate([x, x + away, x - away], axis=1)
 
     def _spread(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean, and departures from it as (flights, states, points)."""
+        """Mean, and departures from it as (runs, states, points)."""
         mean = points[:, 0] + np.tensordot(points - points[:, :1], self.mean_weight, ((1,), (0,)))
         return mean, (points - mean[:, None]).transpose(2, 0, 1)
 
@@ -133,7 +133,7 @@ def euler_rates(tilt: np.ndarray, omega_B: np.ndarray) -> np.ndarray:
 
 
 def rotation(tilt: np.ndarray) -> np.ndarray:
-    """Yaw frame <- body, (flights, 3, 3)."""
+    """Yaw frame <- body, (runs, 3, 3)."""
     (sx, sy), (cx, cy) = np.sin(tilt), np.cos(tilt)
     zero = np.zeros_like(sx)
     rows = [[cy, sy * sx, sy * cx], [zero, cx, -sx], [-sy, cy * sx, cy * cx]]
@@ -141,7 +141,7 @@ def rotation(tilt: np.ndarray) -> np.ndarray:
 
 
 def exponential(turn: np.ndarray) -> np.ndarray:
-    """Rotation matrices of rotation vectors (3, flights)."""
+    """Rotation matrices of rotation vectors (3, runs)."""
     angle = np.maximum(np.linalg.norm(turn, axis=0), 1e-12)
     x, y, z = turn
     zero = np.zeros_like(x)
@@ -199,7 +199,7 @@ class ErrorState(WithHeading):
         self.P = there @ self.P @ there.transpose(0, 2, 1)
 
     def _chart(self) -> np.ndarray:
-        """d(xi, body rates)/d(angles, Euler rates) at x: (flights, 6, 6)."""
+        """d(xi, body rates)/d(angles, Euler rates) at x: (runs, 6, 6)."""
         tilt, (_, dty, dtz) = self.x[:2], self.x[RATES]
         (sx, sy), (cx, cy) = np.sin(tilt), np.cos(tilt)
         T = np.zeros((self.x.shape[1], 6, 6))

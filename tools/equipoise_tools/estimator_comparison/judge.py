@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..campaign_statistics import quantile_interval
-from .flights import SETTLED_S, Estimates, Samples
 from .model import DT, GROUPS
+from .recorded import SETTLED_S, Estimates, Samples
 
 LAGS = 20  # ticks
 
 
 @dataclass
 class Figures:
-    """A value per flight each; NIS, lag and colour by group of rows."""
+    """A value per run each; NIS, lag and colour by group of rows."""
 
     attitude_rad: np.ndarray
     speed_m_s: np.ndarray  # of the ball, in the yaw frame
@@ -26,12 +26,12 @@ class Figures:
 
 
 def rms(values: np.ndarray) -> np.ndarray:
-    """Over ticks and components, per flight."""
+    """Over ticks and components, per run."""
     return np.sqrt(np.square(values).mean(axis=(0, 1)))
 
 
 def correlations(nu: np.ndarray, lags: int = LAGS) -> np.ndarray:
-    """(lags, rows, flights) of (ticks, rows, flights)"""
+    """(lags, rows, runs) of (ticks, rows, runs)"""
     nu = nu - nu.mean(axis=0)
     power = np.maximum(np.square(nu).sum(axis=0), 1e-300)
     return np.stack([(nu[lag:] * nu[:-lag]).sum(axis=0) / power for lag in range(1, lags + 1)])

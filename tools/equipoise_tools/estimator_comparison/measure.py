@@ -1,4 +1,4 @@
-"""Flights, filters, figures: a row per flight and filter."""
+"""Runs, filters, figures: a row per run and filter."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import pyarrow.parquet as pq
 
 from . import drawn
 from .filters import FILTERS
-from .flights import Flight, Samples, fly, run_filter, samples_of
 from .judge import figures, rms
 from .model import DT, GROUPS
+from .recorded import Recording, Samples, record, run_filter, samples_of
 
 WRONG_START_RAD = (0.1, -0.1)
 WRONG_START_TICKS = int(3.0 / DT)
@@ -24,19 +24,19 @@ Row = dict[str, float | str]
 
 
 def _of_one(samples: Samples) -> Samples:
-    """The first flight alone."""
+    """The first run alone."""
     many = {k: v[..., :1] for k, v in vars(samples).items() if isinstance(v, np.ndarray) and k != "t_s"}
     return Samples(**{**vars(samples), **many})
 
 
-def rows_of(samples: Samples, about: Sequence[dict[str, float | str]], flown: bool) -> list[Row]:
-    """Of every filter; flown: the firmware was on the same samples."""
+def rows_of(samples: Samples, about: Sequence[dict[str, float | str]], recorded: bool) -> list[Row]:
+    """Of every filter; recorded: the firmware was on the same samples."""
     radius_m = samples.robot.value("r")
     rows: list[Row] = []
     for kind in FILTERS:
         estimates = run_filter(kind, samples)
         found = figures(estimates, samples, radius_m)
-        wrong = run_filter(kind, samples, WRONG_START_TICKS, WRONG_START_RAD) if flown else None
+        wrong = run_filter(kind, samples, WRONG_START_TICKS, WRONG_START_RAD) if recorded else None
         single, batch = (run_filter(kind, s, TIMED_TICKS).seconds for s in (_of_one(samples), samples))
         for i, whose in enumerate(about):
             row: Row = {**whose, "filter": kind.name}
@@ -65,25 +65,25 @@ def rows_of(samples: Samples, about: Sequence[dict[str, float | str]], flown: bo
 def measure(
     numbers: Iterable[int], cases: Iterable[tuple[float, float]], duration_s: float, seed: int
 ) -> list[Row]:
-    flights: list[Flight] = []
+    runs: list[Recording] = []
     for number in numbers:
         for yaw_hz, drive_mps in cases:
-            flight = fly(number, yaw_hz, drive_mps, duration_s, seed, fidelity="full")
-            if flight.ended == "finished":
-                flights.append(flight)
+            run = record(number, yaw_hz, drive_mps, duration_s, seed, fidelity="full")
+            if run.ended == "finished":
+                runs.append(run)
             else:
-                print(f"robot {number} at {yaw_hz} Hz, {drive_mps} m/s: {flight.ended}; left out")
+                print(f"robot {number} at {yaw_hz} Hz, {drive_mps} m/s: {run.ended}; left out")
     about = [
         {"world": "full", "robot_number": f.robot_number, "yaw_hz": f.yaw_hz, "drive_mps": f.drive_mps}
-        for f in flights
+        for f in runs
     ]
-    samples = samples_of(flights)
-    rows = rows_of(samples, about, flown=True)
-    count = len({f.robot_number for f in flights})
+    samples = samples_of(runs)
+    rows = rows_of(samples, about, recorded=True)
+    count = len({f.robot_number for f in runs})
     for yaw_hz in DRAWN_CASES:
         of = {"world": "drawn", "yaw_hz": yaw_hz, "drive_mps": 0.0}
         about = [{**of, "robot_number": i + 1} for i in range(count)]
-        rows += rows_of(drawn.draw(samples.robot, count, DRAWN_TICKS, yaw_hz, seed), about, flown=False)
+        rows += rows_of(drawn.draw(samples.robot, count, DRAWN_TICKS, yaw_hz, seed), about, recorded=False)
     return rows
 
 

@@ -1,7 +1,7 @@
 """The MBBR's filter model as NumPy functions, from the derivation's SymPy expressions.
 
 The readable form is MbbrEkfModel (src/robots/mbbr/ekf.cpp). States come first: x[i] is an array over
-flights, or over sigma points and flights.
+runs, or over sigma points and runs.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ class Model:
         return self._finish(x, out, plane_scale)
 
     def _finish(self, x: np.ndarray, out: np.ndarray, plane_scale: np.ndarray) -> np.ndarray:
-        """The sums as counted, and the disturbance, whose x and y stand in the room."""
+        """The sums as counted, and the disturbance, whose x and y stand in the world frame."""
         moved = out[E] - x[E]
         out[2:4] += plane_scale * moved[:2]
         out[4] += x[SCALE] * moved[2]

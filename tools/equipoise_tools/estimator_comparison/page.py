@@ -103,8 +103,8 @@ def cost_table(rows: list[Row]) -> str:
         )
         cells.append("{:.0e} rad, {:.0e} m/s".format(*apart))
         body.append(cells)
-    flights = column(rows, "yaw_hz", NAMES[0], world="full").size
-    head = ["filter", "µs per tick, one flight; ratio", f"{flights} at once; ratio", "wrong start, mrad"]
+    runs = column(rows, "yaw_hz", NAMES[0], world="full").size
+    head = ["filter", "µs per tick, one run; ratio", f"{runs} at once; ratio", "wrong start, mrad"]
     return _table([*head, "largest distance from the firmware"], body)
 
 

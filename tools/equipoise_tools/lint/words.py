@@ -41,9 +41,14 @@ TERMS = terms(
     ),
 )  # fmt: skip
 PRODUCT = ("src/", "include/", "drivers/")
+CODE = (*PRODUCT, "tests/", "tools/equipoise_tools/", "python/", "examples/")
+COCKPIT = "tools/equipoise_tools/cockpit/page/"
+SAYS_OLD_WORDS = ("tools/equipoise_tools/lint/words.py", "tests/python/test_lint.py")
 JSON_KEYS_KEPT = '"flights"'
 UNREVISED = ("docs/faults.md",)  # is rewritten with the detector
 GENERATED = ("docs/experiments/", "docs/reports/", "docs/parameters.md", "docs/reasons.md")
+_MESSAGE = re.compile(r'"((?:[^"\\\n]|\\.)+)"')  # a string
+_INTERNAL = re.compile(r"^\s*(?://|#include)|static_assert\(")
 _CODE = re.compile(r"```.*?```|`[^`\n]*`|\]\([^)\s]*\)|<!--.*?-->", re.S)
 
 
@@ -56,6 +61,14 @@ def pages(tree: Tree) -> list[str]:
 def without_code(text: str) -> str:
     """The same lines with code and link targets blanked."""
     return _CODE.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+
+
+def messages(text: str) -> str:
+    """Of code: what users may read, line by line."""
+    return "\n".join(
+        "" if _INTERNAL.search(line) else " | ".join(m for m in _MESSAGE.findall(line) if " " in m.strip())
+        for line in text.splitlines()
+    )
 
 
 def in_words(line: str) -> str:
@@ -78,7 +91,10 @@ def words(tree: Tree) -> list[Finding]:
     for name in pages(tree):
         if name not in UNREVISED:
             findings += found(name, without_code(tree.text(name)), TERMS)
-    for name in tree.ending(*C_SUFFIXES):
-        if name.startswith(PRODUCT):
-            findings += found(name, in_words(tree.text(name)), CODE_TERMS)
+    for name in tree.ending(*C_SUFFIXES, ".py", ".js", ".sh"):
+        if not name.startswith(CODE) or name in SAYS_OLD_WORDS:
+            continue
+        findings += found(name, in_words(tree.text(name)), CODE_TERMS)
+        if name.startswith((*PRODUCT, COCKPIT)):
+            findings += found(name, messages(tree.text(name)), TERMS)
     return findings

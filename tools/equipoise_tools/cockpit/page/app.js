@@ -105,7 +105,7 @@ function showHealth() {
   const health = live && newest?.EQUIPOISE_HEALTH;
   const state = health ? (words.arm_states[health.arm_state] ?? `state ${health.arm_state}`) : "unknown";
   $("state").dataset.state = state;
-  show("arm-state", health ? state : socket?.readyState === WebSocket.OPEN ? "no robot heard" : "no connection");
+  show("arm-state", health ? state : socket?.readyState === WebSocket.OPEN ? "no telemetry" : "no connection");
   const why = health ? [...bits(health.reasons, words.reasons), ...bits(health.sensor_health, words.sensor_health)] : [];
   show("reasons", why.map(([, sentence]) => sentence).join("; "));
   const without = health ? bits(health.degraded, words.degraded) : [];

@@ -63,7 +63,7 @@ const PANELS = {
     FAULTS,
   ],
   mip: [
-    ["Lean (deg)", ["tiltX", "lean", "blue"], ["refX", "wanted", "red", [4, 3]], ["thenX", "what if", "pink", [2, 2]]],
+    ["Tilt (deg)", ["tiltX", "lean", "blue"], ["refX", "wanted", "red", [4, 3]], ["thenX", "what if", "pink", [2, 2]]],
     ["Wheel speed (cm/s)", ["speedX", "measured", "blue"], ["refSpeedX", "wanted", "red", [4, 3]]],
     ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "asked for", "red", [4, 3]]],
     ["Duty", ["duty0", "motor 1", "blue"], ["duty1", "motor 2", "green"]],

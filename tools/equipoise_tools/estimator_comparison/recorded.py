@@ -1,4 +1,4 @@
-"""Recorded flights as the filters get them: on one time base, from the last tick that the robot was held."""
+"""Recorded runs as the filters get them: on one time base, from the last tick that the robot was held."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ STILL = 6  # freshness.hpp: an axis that repeats its count so often is left out
 
 
 @dataclass
-class Flight:
+class Recording:
     """One run of one robot, a row per tick; samples calibrated, as its estimator got them."""
 
     robot_number: int
@@ -48,10 +48,10 @@ def _five(theta: np.ndarray, phi_dot: np.ndarray) -> np.ndarray:
     return np.concatenate([theta[:, :2], phi_dot, theta[:, 2:]], axis=1)
 
 
-def fly(
+def record(
     robot_number: int, yaw_hz: float, drive_mps: float, duration_s: float, seed: int, settings=None, **more
-) -> Flight:
-    """The default filter flies, in double precision as those beside it; the function only listens."""
+) -> Recording:
+    """The default filter runs, in double precision as those beside it; the function only listens."""
     heard: list[tuple] = []
     sound: list[bool] = []
 
@@ -78,7 +78,7 @@ def fly(
     table = np.array(heard, float)
     states = {name: run.log[f"EQUIPOISE_{name}"] for name in ("STATE", "TRUTH")}
     five = {name: _five(s["theta_rad"], s["phi_dot_rad_s"]) for name, s in states.items()}
-    return Flight(
+    return Recording(
         robot_number,
         yaw_hz,
         drive_mps,
@@ -126,32 +126,32 @@ def moving(gyro: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Samples:
-    """Of many flights, ticks first: what acted and stood at the filter's instant, and what to judge by."""
+    """Of many runs, ticks first: what acted and stood at the filter's instant, and what to judge by."""
 
     robot: Robot
-    x0: np.ndarray  # (states, flights)
-    acted: np.ndarray  # (ticks, 3, flights)
+    x0: np.ndarray  # (states, runs)
+    acted: np.ndarray  # (ticks, 3, runs)
     latest: np.ndarray  # input from the filter's instant to the tick
-    y: np.ndarray  # (ticks, rows, flights)
+    y: np.ndarray  # (ticks, rows, runs)
     use: np.ndarray  # the same shape
     t_s: np.ndarray  # (ticks,)
-    truth: np.ndarray  # (ticks, 5, flights)
+    truth: np.ndarray  # (ticks, 5, runs)
     own: np.ndarray
-    own_nis: np.ndarray  # (ticks, flights)
+    own_nis: np.ndarray  # (ticks, runs)
     ahead_s: float
 
 
-def samples_of(flights: Iterable[Flight], **changed: float) -> Samples:
+def samples_of(runs: Iterable[Recording], **changed: float) -> Samples:
     """`changed`: parameters that the filters are told wrongly."""
-    flights = list(flights)
-    robot = robot_of(flights[0].config, flights[0].fidelity, **changed)
+    runs = list(runs)
+    robot = robot_of(runs[0].config, runs[0].fidelity, **changed)
     part = robot.age_s / DT
     if not 0.0 <= part < 1.0:
         raise eq.UserError(f"chain.gyro_delay_s: {robot.age_s} s; this comparison knows ages below a tick")
     axes = Model(robot).robot.T_ob
     ratio = robot.value("r_w") / robot.value("r")
     columns = []
-    for f in flights:
+    for f in runs:
         start = int(np.flatnonzero(f.held)[-1])
         if f.held[: start + 1].sum() != start + 1:
             raise eq.UserError(f"robot {f.robot_number}: its motors went off in between")
@@ -172,7 +172,7 @@ def samples_of(flights: Iterable[Flight], **changed: float) -> Samples:
         judged = (a[start + 1 :] for a in (f.t_s, f.truth, f.own, f.own_nis))
         columns.append((x0, acted, u[1:], y, use, *judged))
     if len({len(c[1]) for c in columns}) > 1:
-        raise eq.UserError("flights of different lengths: one of them ended early")
+        raise eq.UserError("runs of different lengths: one of them ended early")
     stacked = (np.stack(c, axis=-1) for c in zip(*columns, strict=True))
     x0, acted, latest, y, use, t_s, truth, own, own_nis = stacked
     return Samples(robot, x0, acted, latest, y, use, t_s[:, 0], truth, own, own_nis, part * DT)
@@ -180,8 +180,8 @@ def samples_of(flights: Iterable[Flight], **changed: float) -> Samples:
 
 @dataclass
 class Estimates:
-    five: np.ndarray  # (ticks, 5, flights), as Flight.own
-    nu: np.ndarray  # (ticks, rows, flights): whitened innovations
+    five: np.ndarray  # (ticks, 5, runs), as Recording.own
+    nu: np.ndarray  # (ticks, rows, runs): whitened innovations
     seconds: float = 0.0  # of the processor
 
 

@@ -1,4 +1,4 @@
-// Given an IMU that is mounted crookedly and whose gyro is late, when the robot spins and drives on its own
+// Given an IMU that is misaligned and whose gyro is late, when the robot spins and drives on its own
 // sensors, then both robots' default filters hold it. What used to topple them: docs/filter.md.
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ app::SimOptions drive(double yaw_rate_rad_s, double speed_m_s, std::uint64_t see
   return {{true, speed_m_s, yaw_rate_rad_s}, 30.0, seed};
 }
 
-TEST(CrookedLateImu, MbbrSpinsAndDrives) {
+TEST(MisalignedLateImu, MbbrSpinsAndDrives) {
   for (const double yaw_hz : {0.0, 1.0, 3.0}) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       const auto robot = app::load_robot(
@@ -29,7 +29,7 @@ TEST(CrookedLateImu, MbbrSpinsAndDrives) {
   }
 }
 
-TEST(CrookedLateImu, MbbrWithRadiiUnlikeTheConfiguredOnes) {
+TEST(MisalignedLateImu, MbbrWithRadiiUnlikeTheConfiguredOnes) {
   for (const double yaw_hz : {1.0, 3.0}) {
     const auto robot = app::load_robot(
         kConfigs + "mbbr.toml",
@@ -42,7 +42,7 @@ TEST(CrookedLateImu, MbbrWithRadiiUnlikeTheConfiguredOnes) {
   }
 }
 
-TEST(CrookedLateImu, MipSpinsWithBothControllers) {
+TEST(MisalignedLateImu, MipSpinsWithBothControllers) {
   for (const char* controller : {"slc", "lqr"}) {
     for (const double yaw_rad_s : {0.0, 5.0, 10.0}) {
       const auto robot = app::load_robot(
