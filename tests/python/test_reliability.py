@@ -2,7 +2,7 @@
 
 from equipoise_tools.reliability import traced
 from equipoise_tools.reliability_faults import table
-from equipoise_tools.reliability_population import POPULATION_FAULTS, found
+from equipoise_tools.reliability_population import POPULATION_FAULTS, found, of_robots
 
 
 def case(ticks):
@@ -13,6 +13,11 @@ def test_found_tells_median_last_and_what_was_not_found():
     assert found([case(3), case(9), case(4)]) == "4 / 9"
     assert found([case(3), case(None)]) == "3 / 3; 1 of 2 not"
     assert found([case(None)]) == "not found"
+
+
+def test_an_interval_counts_robots_not_their_cases():
+    cases = [{"robot": robot, "unsafe": robot == 3} for robot in range(50) for _ in range(84)]
+    assert of_robots(cases, "unsafe") == "1 of 50 robots, below 10.5 % of them (95 %)"  # Wilson by hand
 
 
 def test_every_fault_of_the_population_is_known(root):

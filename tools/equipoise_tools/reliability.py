@@ -296,7 +296,7 @@ boundary (src/app/io/fault_backend.hpp), in simulated time, world of nominal fid
 controller. Unsafe is: duty after the deadline of the fault, motors on after a fall, a wrong tilt that is not
 noticed, faster than 0.6 m/s or half a metre of unasked travel with motors on, motors off without a reason,
 arming by itself: judged in every tick by the plant's truth (src/app/evaluate/fault_run.hpp). Ticks are 5 ms,
-count from the first spoilt one. Times are of this machine, not of a BeagleBone. Which one-token changes of
+count from the first faulty one. Times are of this machine, not of a BeagleBone. Which one-token changes of
 this code the tests notice: [mutation testing](mutation.md).
 
 | what | wanted | measured | holds |

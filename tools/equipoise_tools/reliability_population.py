@@ -1,4 +1,4 @@
-"""Faults of imperfect, held-out robots, and sound ones that must be left alone."""
+"""Faults of imperfect, held-out robots, and healthy ones that must not be disarmed."""
 
 from __future__ import annotations
 
@@ -29,13 +29,21 @@ def of_population(config, faults, robots: int) -> list[dict]:
 
 
 def found(cases: list[dict]) -> str:
-    """When, in ticks after the first spoilt one: median and the last, and how many were not."""
+    """When, in ticks after the first faulty one: median and the last, and how many were not."""
     ticks = sorted(c["found_after_ticks"] for c in cases if c["found_after_ticks"] is not None)
     never = len(cases) - len(ticks)
     if not ticks:
         return "not found"
     text = f"{ticks[len(ticks) // 2]} / {ticks[-1]}"
     return f"{text}; {never} of {len(cases)} not" if never else text
+
+
+def of_robots(cases: list[dict], what: str) -> str:
+    """Cases of one robot are not independent, robots are: the interval counts those with any such case."""
+    robots = {c["robot"] for c in cases}
+    hit = {c["robot"] for c in cases if c[what]}
+    _, high = wilson(len(hit), len(robots))
+    return f"{len(hit)} of {len(robots)} robots, below {100 * high:.1f} % of them (95 %)"
 
 
 def unsafe_ones(cases: list[dict]) -> str:
@@ -49,31 +57,32 @@ def population(options: argparse.Namespace) -> Part:
     for robot, config in CONFIGS.items():
         cases = of_population(config, POPULATION_FAULTS, options.robots)
         unsafe = sum(c["unsafe"] for c in cases)
-        _, high = wilson(unsafe, len(cases))
+        text = f"{len(cases)} cases, {unsafe} unsafe; {of_robots(cases, 'unsafe')}"
         part.rows.append(
             (
                 f"{robot}: {len(POPULATION_FAULTS)} faults × 4 phases, {options.robots} imperfect robots",
                 "0 unsafe",
-                f"{len(cases)} cases, {unsafe} unsafe, share below {100 * high:.2f} % (95 %)",
+                text,
                 unsafe == 0 < len(cases),
             )
         )
-        sound = of_population(
-            config, ["torn_packet"], options.robots
-        )  # no fault of a robot that does not use it
-        alarms = sum(c["disarmed"] or bool(c["degraded"]) or not c["upright"] for c in sound)
+        # No fault of a robot that does not use it.
+        healthy = of_population(config, ["torn_packet"], options.robots)
+        for case in healthy:
+            case["alarm"] = case["disarmed"] or bool(case["degraded"]) or not case["upright"]
+        alarms = sum(c["alarm"] for c in healthy)
         part.rows.append(
             (
-                f"{robot}: sound imperfect robots",
-                "0 disarmed, 0 with a sensor left out",
-                f"{len(sound)} runs, {alarms} alarms",
-                alarms == 0 < len(sound),
+                f"{robot}: healthy imperfect robots",
+                "0 disarmed, 0 with a sensor excluded",
+                f"{len(healthy)} runs, {alarms} alarms; {of_robots(healthy, 'alarm')}",
+                alarms == 0 < len(healthy),
             )
         )
         part.section += (
             f"## {robot}: imperfect robots\nFirst robot {HELD_OUT}, world of full fidelity. Ticks until the "
         )
-        part.section += "motors were off or the part was left out, median / last.\n\n"
+        part.section += "motors were off or the part was excluded, median / last.\n\n"
         part.section += f"| fault | {' | '.join(PHASES)} |\n|---|{'---|' * len(PHASES)}\n"
         for fault in POPULATION_FAULTS:
             cells = [found([c for c in cases if (c["fault"], c["phase"]) == (fault, ph)]) for ph in PHASES]
