@@ -216,7 +216,7 @@ def test_nothing_waits_for_a_pipe(do, root, tmp_path):
     for name in ("pipe", "pipe.lcm"):
         os.mkfifo(tmp_path / name, 0o600)
     sim = ["sim", "--config", str(config), "--duration-s", "1", "--log"]
-    assert "nobody reads" in do(*sim, "off", "--json", "pipe", status=2)
+    assert "without a reader" in do(*sim, "off", "--json", "pipe", status=2)
     assert "no regular file" in do("model", "--robot", "mip", "--in", "pipe", "--json", "-", status=2)
     assert "is no file" in do("send", "--key", "pipe", "--arm", status=2)
     assert "no regular file" in do(*sim, "off", "--path", "pipe", status=2)
