@@ -151,7 +151,7 @@ def test_panels_follow_the_robot(known_log, tmp_path):
     assert mbbr[:2] == ["Tilt about x, $\\theta_x$", "Tilt about y, $\\theta_y$"]
     assert {"Ball speed along x", "Ball position y", "Track on the floor", "Yaw rate", "Duty"} <= set(mbbr)
     mip = titles(synthetic.write_log(tmp_path / "mip.lcm", robot="mip"))
-    assert mip[:2] == ["Lean, $\\theta$", "Wheel speed"]
+    assert mip[:2] == ["Tilt, $\\theta$", "Wheel speed"]
     assert "Wheel speed error, smoothed" in mip
     assert not any("Ball" in title or "about y" in title for title in mip)
 

@@ -258,7 +258,7 @@ class Report:
                 panels += [self.speed(0, "Ball speed along x"), self.speed(1, "Ball speed along y")]
                 panels += [self.position(0, "Ball position x"), self.position(1, "Ball position y")]
             else:
-                panels += [self.tilt(0, "Lean, $\\theta$"), self.wheel_speed]
+                panels += [self.tilt(0, "Tilt, $\\theta$"), self.wheel_speed]
                 panels += [self.position(0, "Position x"), self.position(1, "Position y")]
             panels += [self.yaw_rate, self.heading]
             panels += [self.track]
