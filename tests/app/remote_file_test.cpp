@@ -288,6 +288,7 @@ TEST(FrameLearning, AFrameHasUpTo32Bytes) {
     return text;
   };
   EXPECT_EQ(learn_button({{1.0, bytes(32)}, {2.0, bytes(31)}}).error, "");
+  EXPECT_EQ(learn_button({{1.0, bytes(31)}, {2.0, bytes(32)}}).error, "");
   EXPECT_THAT(learn_button({{1.0, bytes(33)}}).error, HasSubstr("32 bytes"));
   EXPECT_THAT(learn_button({{1.0, "a"}, {2.0, bytes(33)}}).error, HasSubstr("32 bytes"));
   EXPECT_THAT(learn_button(portions({"A", "B", "C"}, 0.1)).error, HasSubstr("(41, 42, ...)"));

@@ -144,5 +144,11 @@ TEST_F(Manager, ThatIsNotThereOrHasTooLongANameIsNotToldAnything) {
   EXPECT_TRUE(heard().empty());
 }
 
+TEST_F(Manager, IsNotNeeded) {
+  unsetenv("NOTIFY_SOCKET");
+  ServiceNotify service;
+  for (int tick = 0; tick < 10; ++tick) service.note(tick);
+}
+
 }  // namespace
 }  // namespace equipoise::app

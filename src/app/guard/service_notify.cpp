@@ -22,29 +22,31 @@ std::int64_t watchdog_period_us() {
   return value > 0 ? value / 4 : kDefaultPeriod_us;
 }
 
+/// Its socket; empty where there is none.
+std::string service_manager() {
+  const char* const name = std::getenv("NOTIFY_SOCKET");
+  return name == nullptr ? "" : name;
+}
+
 }  // namespace
 
 void notify_service_manager(const std::string& message) {
-  const char* const name = std::getenv("NOTIFY_SOCKET");
-  if (name == nullptr || *name == '\0') return;
+  const std::string name = service_manager();
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  const std::size_t length = std::strlen(name);
-  if (length >= sizeof address.sun_path) return;
-  std::memcpy(address.sun_path, name, length);
+  if (name.empty() || name.size() >= sizeof address.sun_path) return;
+  std::memcpy(address.sun_path, name.data(), name.size());
   if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // abstract
   const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return;
   (void)sendto(fd, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
                reinterpret_cast<const sockaddr*>(&address),
-               static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length));
+               static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size()));
   close(fd);
 }
 
 ServiceNotify::ServiceNotify() : period_us_(watchdog_period_us()) {
-  const char* const path = std::getenv("NOTIFY_SOCKET");
-  if (path == nullptr || *path == '\0') return;
-  thread_ = std::thread([this] { beat(); });
+  if (!service_manager().empty()) thread_ = std::thread([this] { beat(); });
 }
 
 ServiceNotify::~ServiceNotify() {
