@@ -118,12 +118,15 @@ def test_a_name_in_a_log_cannot_end_the_script(opened, tmp_path, monkeypatch):
 def test_long_runs_keep_their_extremes():
     import numpy as np
 
-    t_s = 0.005 * np.arange(100_000)
+    t_s = 0.005 * np.arange(100_000)  # two points of the grid share 200 of them
     values = np.zeros(t_s.size)
-    values[54_321] = 7.0
-    values[54_400:54_500] = np.nan
+    values[54_321], values[54_350] = 7.0, -7.0
+    values[54_330:54_340] = np.nan
+    values[60_000:60_400] = np.inf
     shown = on_grid(np.linspace(0, t_s[-1], 1000), t_s, values)
-    assert shown.size == 1000 and np.nanmax(shown) == 7.0
+    hole = ~np.isfinite(shown)
+    assert shown.size == 1000 and np.nanmax(shown) == 7.0 and np.nanmin(shown) == -7.0
+    assert np.isnan(shown[hole]).all() and 2 <= hole.sum() <= 4
 
 
 def test_without_uplot_the_picture_is_shown(known_log, tmp_path, capsys, monkeypatch):
