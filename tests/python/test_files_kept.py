@@ -91,17 +91,18 @@ def test_json_replaces_json_only(do, log, root, tmp_path):
     do(*sim, "out.json", status=0)
 
 
-def test_a_link_is_no_file(do, root, tmp_path):
+@pytest.mark.parametrize(
+    "command", [["sim", "--telemetry"], ["run", "--backend", "sim", "--command-url"], ["send", "--url"]]
+)
+def test_what_is_no_link(do, root, tmp_path, command):
+    """A file would be replaced; a TCP server that goes would end a robot that balances."""
     kept = tmp_path / "kept.txt"
     kept.write_text("kept")
-    config = ("--config", root / "config/edumip.toml", "--duration-s", "1")
-    for command in (
-        ("sim", *config, "--telemetry"),
-        ("run", "--backend", "sim", *config, "--command-url"),
-        ("send", "--disarm", "--url"),
-    ):
-        assert "a file is no link" in do(*command, f"file://{kept}?mode=w", status=2), command
-        assert kept.read_text() == "kept"
+    more = ["--disarm"] if "send" in command else ["--config", root / "config/edumip.toml", "--duration-s", 1]
+    assert "a file is no link" in do(*command, f"file://{kept}?mode=w", *more, status=2)
+    assert "ends the program when its server does" in do(*command, "tcpq://127.0.0.1:1", *more, status=2)
+    assert "names no link" in do(*command, "", *more, status=2)
+    assert kept.read_text() == "kept"
 
 
 def test_attaching_replaces_no_file(tmp_path):
@@ -111,6 +112,8 @@ def test_attaching_replaces_no_file(tmp_path):
         with pytest.raises(UserError, match="might replace that file"):
             open_source(url)
     assert kept.read_bytes() == b"mine"
+    with pytest.raises(UserError, match="when its server does"):
+        open_source("tcpq://127.0.0.1:1")
 
 
 def test_a_log_of_one_name_leaves_the_others(do, root, tmp_path, known_log):

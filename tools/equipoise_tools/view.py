@@ -135,6 +135,8 @@ def updates(source: lcm.LCM, latest: Latest, every_s: float, for_s: float) -> It
 def open_source(url: str) -> lcm.LCM:
     if url.startswith("file:") and "mode=r" not in url:
         raise UserError(f"{url}: LCM might replace that file; add ?mode=r to play it")
+    if url.startswith("tcpq:"):
+        raise UserError(f"{url}: LCM ends the program when its server does; use udpm")
     try:
         return lcm.LCM(url)
     except (RuntimeError, OSError):

@@ -35,9 +35,11 @@ std::string number_error(const std::string& text) {
   return "";
 }
 
-/// LCM would replace that file.
+/// LCM would replace that file, take any provider from the environment, and abort when a TCP server is gone.
 std::string url_error(const std::string& url) {
-  return url.rfind("file:", 0) == 0 ? url + ": a file is no link; --log FILE writes one" : "";
+  if (url.empty()) return "names no link";
+  if (url.rfind("file:", 0) == 0) return url + ": a file is no link; --log FILE writes one";
+  return url.rfind("tcpq:", 0) == 0 ? url + ": ends the program when its server does; use udpm" : "";
 }
 
 CLI::Option* checked(CLI::Option* option, std::string (*error)(const std::string&)) {
