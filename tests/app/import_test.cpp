@@ -55,6 +55,12 @@ TEST(Table, ReadsFloat32RowsBehindAHeader) {
   EXPECT_EQ(t.torn_rows, 1U);
 }
 
+TEST(Table, TakesWhatSpreadsheetsWriteAroundATable) {
+  const Table t = read_table(file_of("s.csv", "\xEF\xBB\xBF\"\"\n\"t\",\"u\"\n\"\"\n1,2\n\"\n"), {});
+  EXPECT_THAT(t.names, ElementsAre("t", "u"));
+  EXPECT_THAT(t.columns[1], ElementsAre(2.0));
+}
+
 TEST(Table, NamesWhatItCannotRead) {
   EXPECT_THAT(refusal(file_of("d.csv", "a,b\n1,2\n3,four\n")),
               HasSubstr("d.csv:3: b: \"four\" is not a number"));

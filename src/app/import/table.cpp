@@ -16,9 +16,10 @@ bool ends_in(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
+constexpr std::string_view kBlank = " \t\r\"";
+
 /// Comma, semicolon or tab where a line has one, else runs of blanks; blanks around a cell do not count.
 void split(std::string_view line, std::vector<std::string_view>* cells) {
-  constexpr std::string_view kBlank = " \t\r\"";
   cells->clear();
   constexpr std::string_view kSeparators = ",;\t";
   const auto* const found =
@@ -62,12 +63,13 @@ Table read_text_table(const std::string& path, const TableShape& shape) {
   std::vector<std::string_view> cells;
   std::vector<double> row;
   int number_of_line = 0;
-  for (std::size_t at = 0; at < text.size();) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // which spreadsheets write
+  for (std::size_t at = text.rfind(kByteOrderMark, 0) == 0 ? kByteOrderMark.size() : 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::string_view line(text.data() + at, end - at);
     at = end + 1;
     ++number_of_line;
-    const std::size_t first = line.find_first_not_of(" \t\r");
+    const std::size_t first = line.find_first_not_of(kBlank);
     if (first == std::string_view::npos || line[first] == '%' || line[first] == '#') continue;
     split(line, &cells);
     if (table.names.empty()) {
