@@ -7,8 +7,9 @@ import math
 import pytest
 
 pytest.importorskip("equipoise_robot._core", reason="needs python3-dev; tools/test installs it")
-from driven import every_float, rewritten
+from driven import equipoise, every_float, rewritten
 from equipoise_robot import lerobot, mcap, rosbag2
+from equipoise_tools import report
 from equipoise_tools.cockpit.playback import Playback
 
 
@@ -70,6 +71,19 @@ def test_are_converted_or_refused_in_one_line(converter, library, hostile, tmp_p
     if status:
         assert status == 2 and said.startswith(f"error: {hostile}: ") and said.count("\n") == 1
         assert "/tmp" not in said.replace(str(hostile), "")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_are_reported_or_refused(hostile, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(report, "picture_of", lambda run: b"")
+    if report.main([str(hostile), "--out", str(tmp_path)]):
+        said = capsys.readouterr().err
+        assert said.startswith(f"error: {hostile}: ") and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("beside", [[], ["--shadow"]])
+def test_are_replayed_or_refused(root, hostile, beside):
+    assert equipoise(root, "replay", hostile, *beside).returncode in (0, 1, 2)
 
 
 @pytest.mark.filterwarnings("ignore")

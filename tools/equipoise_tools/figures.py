@@ -10,7 +10,7 @@ from equipoise_robot.log import Log
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from . import names, style
-from .metrics import Summary, estimator_channels, outcome, run_record, tilt_axes
+from .metrics import Summary, estimator_channels, motors_of, outcome, run_record, tilt_axes
 from .style import plt
 
 SMOOTHING_RAD_S = (
@@ -191,7 +191,7 @@ class Report:
 
     def duties(self, axes: plt.Axes) -> None:
         motors = self.log[names.MOTORS]
-        count = max(1, int(motors["motors"][0]))
+        count = motors_of(self.log)
         for motor in range(count):
             y = motors["duty"][:, motor]
             axes.plot(

@@ -13,7 +13,7 @@ from equipoise_robot.log import Log
 
 from . import names, style
 from .figures import drive_phases, heading_rad, rolling_unit, smoothed, velocity_W_m_s
-from .metrics import Summary, estimator_channels, tilt_axes
+from .metrics import Summary, estimator_channels, motors_of, tilt_axes
 from .paths import repository_root
 
 UPLOT = repository_root() / "build/page/node_modules/uplot/dist"
@@ -108,7 +108,7 @@ def plots_of(run: Run, compared: bool) -> list[Plot]:
     add("Heading", "turns", lambda channel: heading_rad(log, channel) / (2 * np.pi))
     if names.MOTORS in log:
         motors, t_s = log[names.MOTORS], log.seconds(names.MOTORS)
-        count = max(1, int(motors["motors"][0]))
+        count = motors_of(log)
         duty = motors["duty"][:, :count]
         if compared:
             series = [Series("largest of the motors", t_s, np.abs(duty).max(axis=1), style.ESTIMATE)]

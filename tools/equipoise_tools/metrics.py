@@ -66,6 +66,12 @@ def robot_of(log: Log) -> str:
     return {2: "mip", 3: "mbbr"}.get(int(wheels), "robot")
 
 
+def motors_of(log: Log) -> int:
+    """What it says, within what it holds."""
+    motors = log[names.MOTORS]
+    return int(np.clip(motors["motors"][0], 1, motors["duty"].shape[1]))
+
+
 def tilt_axes(log: Log) -> int:
     """The MBBR tilts about two axes, the MIP about one."""
     return 1 if robot_of(log) == "mip" else 2
@@ -287,12 +293,14 @@ def check_time(log: Log) -> None:
 def summarise(log: Log) -> Summary:
     check_time(log)
     best = names.TRUTH if names.TRUTH in log else names.STATE
-    longest = max((channel for channel in log if channel != names.RUN), key=lambda channel: log[channel].size)
+    ticks = max((log[channel].size for channel in log if channel != names.RUN), default=0)
+    if ticks == 0:
+        raise UserError(f"{log.path}: holds nothing but what was run")
     ended, reasons, fell_at_s = verdict(log)
     summary = Summary(
         robot=robot_of(log),
         duration_s=log.duration_s,
-        ticks=log[longest].size,
+        ticks=ticks,
         armed_s=0.0,
         ended=ended,
         reasons=reasons,

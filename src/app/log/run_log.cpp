@@ -66,7 +66,7 @@ bool RunLog::next(TickRecord* tick) {
       tick_ = TickRecord{};
       std::int64_t utime = 0;
       if (runtime::decode(fields::Sensors{}, event.data, &tick_, &utime, &tick_.tick)) seen_ = 1;
-      tick_.now_ns = utime * 1000;
+      tick_.now_ns = static_cast<std::int64_t>(static_cast<std::uint64_t>(utime) * 1000U);  // whatever it is
     } else if (seen_ != 0) {
       take(event);
     }

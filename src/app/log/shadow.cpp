@@ -108,9 +108,11 @@ Shadow shadow_log(RunLog& log, const std::string& origin, const std::string& con
     Choice choice{"", "", info.backend == "import" ? "" : info.fidelity, false, "", ""};
     complete(ConfiguredRobotOf<Robot>::robot_type(), &choice);
     const auto c = Robot::apply(loaded.config, choice);
+    std::vector<ShadowTick> ticks = shadow_ticks(log);
+    if (ticks.empty()) throw InputError(origin + ": holds no whole tick");
     Shadow out = Robot::with_pipeline(c, choice.controller, [&](auto& pipeline) {
       return ShadowRun<std::decay_t<decltype(pipeline)>>(pipeline.params(), Robot::rolling_radius_m(c),
-                                                         c.robot.l_a.z(), shadow_ticks(log))
+                                                         c.robot.l_a.z(), std::move(ticks))
           .run();
     });
     const WorldParams& world = c.world[fidelity_level("full")].common;
