@@ -209,6 +209,31 @@ def test_frames_go_on_when_the_clock_is_set_back(monkeypatch):
     in_a_loop(run())
 
 
+@pytest.mark.parametrize("change", [lambda m: m[:20], lambda m: m[:-1], lambda m: m + bytes(70_000)])
+@pytest.mark.parametrize("channel", [names.STATE, names.MOTORS, names.TIMING])
+def test_a_message_of_the_wrong_length_reaches_no_page(channel, change):
+    import equipoise
+
+    kinds = {
+        names.STATE: equipoise.state_t,
+        names.MOTORS: equipoise.motors_t,
+        names.TIMING: equipoise.timing_t,
+    }
+
+    async def run():
+        hub = Cockpit(SimpleNamespace(robot="", config=None))
+        shown = []
+        hub.pages = [SimpleNamespace(playback=None, offer=shown.append, tell=lambda **_: None)]
+        for each, kind in kinds.items():
+            message = kind().encode()
+            hub.hear(each, change(message) if each == channel else message)
+        parts = sum(3 + len(kind().encode()[8:]) for each, kind in kinds.items() if each != channel)
+        assert hub.status()["foreign"] == 1
+        assert [len(frame) for frame in shown] == ([] if channel == names.TIMING else [9 + parts])
+
+    in_a_loop(run())
+
+
 def test_recordings_of_one_second_are_two_and_a_full_disk_is_said(tmp_path):
     async def run():
         hub = Cockpit(SimpleNamespace(robot="mbbr", config=None, logs=tmp_path))

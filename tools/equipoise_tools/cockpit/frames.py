@@ -49,8 +49,13 @@ def layouts() -> list[dict]:
     return described
 
 
-def fingerprints() -> dict[str, bytes]:
-    by_name = {kind.name: kind.fingerprint for kind in message_types().values()}
+def expected() -> dict[str, tuple[bytes, int]]:
+    """How each channel's messages begin, and their length."""
+    by_name = {
+        kind.name: (kind.fingerprint, 8 + kind.layout.itemsize)
+        for kind in message_types().values()
+        if kind.layout
+    }
     return {channel: by_name[name] for channel, name in CHANNELS.items()}
 
 
@@ -67,18 +72,18 @@ class Assembler:
     """Messages as they arrive -> one frame per tick, not more often than `interval_s`."""
 
     interval_s: float = 0.018  # every other tick of those that are published, 50 a second
-    wanted: dict[str, bytes] = field(default_factory=fingerprints)
+    wanted: dict[str, tuple[bytes, int]] = field(default_factory=expected)
     newest: dict[str, bytes] = field(default_factory=dict)
-    foreign: int = 0  # messages of an unknown type or version
+    foreign: int = 0  # messages of an unknown type or version, or cut off
     last_s: float = float("-inf")
     utime: int = 0
 
     def take(self, channel: str, data: bytes, now_s: float) -> dict[str, bytes] | None:
         """The messages of a frame when this one completes it."""
-        fingerprint = self.wanted.get(channel)
-        if fingerprint is None:
+        wanted = self.wanted.get(channel)
+        if wanted is None:
             return None
-        if data[:8] != fingerprint:
+        if (data[:8], len(data)) != wanted:
             self.foreign += 1
             return None
         self.newest[channel] = data[8:]
