@@ -1,5 +1,7 @@
 """C3D motion capture against a file written here by the format's description, with a known motion."""
 
+import contextlib
+import os
 import struct
 
 import numpy as np
@@ -77,3 +79,21 @@ def test_other_files_are_refused_with_a_reason(tmp_path):
         c3d.read_c3d(cut)
     with pytest.raises(UserError, match="No such file"):
         c3d.read_c3d(tmp_path / "none.c3d")
+    os.mkfifo(tmp_path / "pipe.c3d")
+    with pytest.raises(UserError, match="is no file"):
+        c3d.read_c3d(tmp_path / "pipe.c3d")
+
+
+@pytest.mark.filterwarnings("ignore")  # of NumPy about such numbers
+def test_whatever_its_header_says_it_is_read_or_refused(tmp_path):
+    _, turn, place = motion(20)
+    good = write(tmp_path / "a.c3d", turn, place).read_bytes()
+    bad = tmp_path / "bad.c3d"
+    random = np.random.default_rng(1)
+    for _ in range(1500):
+        changed = bytearray(good)
+        for at in random.choice([*range(24), *range(512, 560)], random.integers(1, 4)):
+            changed[at] = random.choice([0, 1, 127, 128, 255, random.integers(256)])
+        bad.write_bytes(changed)
+        with contextlib.suppress(UserError):
+            c3d.read_c3d(bad)

@@ -94,3 +94,19 @@ def test_intervals_from_a_real_ball_bot_hold_on_its_next_24_s(root):
     for which in ("ahead_configured", "ahead_identified"):
         ahead = first[which]
         assert ahead["model"]["wheel"] < 0.4 * ahead["constant_rate"]["wheel"]
+
+
+@pytest.mark.parametrize(
+    ("table", "settings", "complaint"),
+    [
+        ("", 'robot = "ROOT/config/real/rob311.toml"\n[time]\ncolumn = "t"\n', "holds no row"),
+        ("t\n1\n", "", "has no 'robot'"),
+    ],
+)
+def test_what_is_no_table_and_no_map_is_said_in_a_line(root, tmp_path, table, settings, complaint):
+    (tmp_path / "t.csv").write_text(table)
+    (tmp_path / "m.toml").write_text(settings.replace("ROOT", str(root)) + "[tilt]\n[wheels]\n[drive]\n")
+    command = [sys.executable, "-m", "equipoise_tools.identify_balancing", tmp_path / "t.csv"]
+    command += ["--map", tmp_path / "m.toml"]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and complaint in done.stderr and done.stderr.count("\n") == 1

@@ -54,10 +54,19 @@ def _text_parameter(data: bytes, start: int, group: str, name: str) -> str | Non
 
 def read_points(path: str | Path) -> Points:
     """Raises UserError naming the file and what is wrong with it."""
+    if Path(path).exists() and not Path(path).is_file():
+        raise UserError(f"{path}: is no file")  # a pipe or a device might never end
     try:
-        data = Path(path).read_bytes()
+        return _points(path, Path(path).read_bytes())
     except OSError as error:
         raise UserError(f"{path}: {error.strerror or error}") from None
+    except UserError:
+        raise
+    except (struct.error, LookupError, ValueError) as error:
+        raise UserError(f"{path}: no C3D file as the format says ({error})") from None
+
+
+def _points(path: str | Path, data: bytes) -> Points:
     if len(data) < 2 * _BLOCK or data[1] != 0x50:
         raise UserError(f"{path}: not a C3D file")
     parameters = (data[0] - 1) * _BLOCK
@@ -71,7 +80,13 @@ def read_points(path: str | Path) -> Points:
     number = np.dtype("<f4" if scale < 0 else "<i2")
     row = 4 * markers + analogue
     begin = (block - 1) * _BLOCK
-    if markers == 0 or frames < 1 or rate_hz <= 0 or begin + frames * row * number.itemsize > len(data):
+    if (
+        markers == 0
+        or frames < 1
+        or not 0 < rate_hz < np.inf
+        or begin < 0
+        or begin + frames * row * number.itemsize > len(data)
+    ):
         raise UserError(f"{path}: no points, or the file is cut short")
     values = np.frombuffer(data, number, frames * row, begin).reshape(frames, row)[:, : 4 * markers]
     values = values.reshape(frames, markers, 4).astype(float)
@@ -79,7 +94,7 @@ def read_points(path: str | Path) -> Points:
     if unit not in _METRES:
         raise UserError(f"{path}: POINT:UNITS is {unit!r}; expected m, cm or mm")
     position = values[..., :3] * _METRES[unit] * (1.0 if scale < 0 else scale)
-    position[values[..., 3] < 0] = np.nan
+    position[(values[..., 3] < 0) | ~np.isfinite(position).all(axis=-1)] = np.nan
     return Points(float(rate_hz), position)
 
 

@@ -53,6 +53,8 @@ def geometry(robot: dict[str, Any], axes: np.ndarray | None = None) -> dict[str,
 
 def read_table(path: Path, shape: dict[str, Any]) -> pd.DataFrame:
     names = shape.get("columns")
+    if path.exists() and not path.is_file():
+        raise UserError(f"{path}: is no file")  # a pipe might never end
     try:
         if shape.get("format") == "float32":
             if not names:
@@ -62,10 +64,14 @@ def read_table(path: Path, shape: dict[str, Any]) -> pd.DataFrame:
                 values[: len(values) // len(names) * len(names)].reshape(-1, len(names)), columns=names
             )
         lines = [
-            x for x in path.read_text().splitlines() if x.strip() and not x.lstrip().startswith(("%", "#"))
+            x
+            for x in path.read_text("utf-8-sig").splitlines()
+            if x.strip() and not x.lstrip().startswith(("%", "#"))
         ]
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: {error}") from None
+    if not lines:
+        raise UserError(f"{path}: holds no row")
     separator = next((s for s in ",;\t" if s in lines[0]), r"\s+")
     table = pd.read_csv(StringIO("\n".join(lines)), sep=separator, names=names, header=None if names else 0)
     return table.apply(pd.to_numeric, errors="coerce")

@@ -137,6 +137,9 @@ def main() -> int:
     except UserError as error:
         print(f"error: {given.table}: {error}", file=sys.stderr)
         return 2
+    except KeyError as missing:
+        print(f"error: {given.map}: has no {missing}", file=sys.stderr)
+        return 2
     rest = log.part(t >= split)
     result: dict[str, Any] = {
         "log": str(given.table),
