@@ -2,6 +2,7 @@
 
 import json
 import re
+import resource
 import subprocess
 from pathlib import Path
 
@@ -62,6 +63,20 @@ def test_a_calibration_through_a_link_renews_the_file_and_no_other(root, tmp_pat
         assert on_stand(root, "calibrate gyro", "--out", link if out.exists() else out).returncode == 0
     assert link.is_symlink() and other.read_text() == "mine"
     assert sorted(tmp_path.iterdir()) == [out, other, link]
+
+
+def test_a_full_disk_leaves_the_calibration_as_it_was(root, tmp_path):
+    out = tmp_path / "calibration.toml"
+    assert on_stand(root, "calibrate gyro", "--out", out).returncode == 0
+    before = out.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        ended = on_stand(root, "calibrate gyro", "--out", out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert ended.returncode == 2 and "calibration.toml: cannot be written" in ended.stderr
+    assert list(tmp_path.iterdir()) == [out] and out.read_bytes() == before
 
 
 def test_a_poor_fit_of_the_accelerometer_is_not_kept(root, tmp_path):

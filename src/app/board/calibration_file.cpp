@@ -171,13 +171,14 @@ void write_whole(const std::string& text, const std::string& path) {
   const std::filesystem::path linked = std::filesystem::canonical(path, error);
   const std::string target = error ? path : linked.string();
   const std::string partial = target + "." + std::to_string(getpid()) + ".partial";
-  {
-    std::ofstream file(partial);
-    file << text;
-    if (!file.flush()) throw InputError(path + ": cannot be written");
-  }
-  std::filesystem::rename(partial, target, error);
-  if (error) throw InputError(path + ": " + error.message());
+  std::ofstream file(partial);
+  const bool written = file << text && file.flush();
+  file.close();
+  if (written) std::filesystem::rename(partial, target, error);
+  if (written && !error) return;
+  std::error_code ignored;
+  std::filesystem::remove(partial, ignored);
+  throw InputError(path + ": " + (written ? error.message() : "cannot be written"));
 }
 
 void save_calibration(const CalibrationFile& file, const std::string& path) {
