@@ -54,11 +54,16 @@ class Evidence {
 
   /// A tick's first: what is expected of the others, and its own.
   double expect(const Filter& f, const Sample& used, const Sample& came) noexcept {
-    for (std::size_t row = 0; row < kRows; ++row) faulty_[row] = log_faulty(row, came);
+    for (std::size_t row = 0; row < kRows; ++row) {
+      faulty_[row] = log_faulty(row, came);
+      shaken_[row] = faulty_[row] + (row < 3 ? std::log(kShaken) : std::log(kFelt));
+    }
     double misfit = 0.0;
+    shaken_most_ = 0.0;
     const double density = log_density(f, used, came, [&](std::size_t row, double peak, double says) {
       peak_[row] = peak;
       misfit += peak - says;
+      shaken_most_ += contaminated(row, peak) - peak;
     });
     expected_ = density + misfit;
     knows_less_ = !(density > kDiverged);
@@ -74,19 +79,27 @@ class Evidence {
   /// What a filter could say of this tick at most that uses some rows of `all`, and so is surer of none: it
   /// need not run to be refuted.
   double most(const Sample& all, const Sample& used, const Sample& came) const noexcept {
-    double sum = kRounding;
+    double sum = 0.0;
     for (std::size_t row = 0; row < kRows; ++row) {
-      if (!comes(came, row)) continue;
-      if (!comes(all, row)) {
-        if (comes(used, row)) return kOutlier;
-      } else {
-        sum += (comes(used, row) ? contaminated(row, peak_[row]) : faulty_[row]) - peak_[row];
-      }
+      if (!comes(came, row) || comes(all, row) == comes(used, row)) continue;
+      if (comes(used, row)) return kOutlier;
+      sum += faulty_[row] - peak_[row];
     }
-    return std::max(sum, 3.0 - kOutlier) + 0.05;  // bounded(): log(1 + exp(-3)) < 0.05
+    return most_of(sum);
+  }
+  /// The same of one that uses all, but takes gyro and accelerometer to be so noisy.
+  double most(const Sample& all, double gyro_rad_s, double accel_m_s2) const noexcept {
+    const double gyro = log_normal(0.0, std::pow(kModelError * gyro_rad_s, 2));
+    const double accel = log_normal(0.0, std::pow(kModelError * accel_m_s2, 2));
+    double sum = 0.0;
+    for (std::size_t row = 0; row < kRows; ++row) {
+      if (!comes(all, row) || (row >= kWheelRow && row < kAccelRow)) continue;
+      sum += std::min((row < 3 ? gyro : accel) - peak_[row], 0.0);
+    }
+    return most_of(sum);
   }
   double operator()(const Filter& f, const Sample& used, const Sample& came) const noexcept {
-    return bounded(log_density(f, used, came, [](auto&&...) {}));
+    return bounded(log_density(f, used, came));
   }
   /// What comes and goes from sample to sample is vibration (von Neumann 1941); the median of the gyro's
   /// axes, for one may be faulty.
@@ -197,9 +210,7 @@ class Evidence {
 
   /// A sample of the IMU may be shaken: then it reads as a faulty one's would.
   double contaminated(std::size_t row, double log_density) const noexcept {
-    if (row < 3) return std::max(log_density, faulty_[row] + std::log(kShaken));
-    if (row >= kAccelRow) return std::max(log_density, faulty_[row] + std::log(kFelt));
-    return log_density;
+    return row < 3 || row >= kAccelRow ? std::max(log_density, shaken_[row]) : log_density;
   }
 
   /// Of the rows that came; those that are not used, as a faulty sensor has them. told(row, density of no
@@ -224,6 +235,38 @@ class Evidence {
     return sum;
   }
 
+  /// The same with one logarithm of all variances, as VFP takes long for each.
+  double log_density(const Filter& f, const Sample& used, const Sample& came) const noexcept {
+    double sum = 0.0;
+    double squares = 0.0;
+    double product = 1.0;
+    for (std::size_t row = 0; row < kRows; ++row) {
+      if (!comes(came, row)) continue;
+      if (!comes(used, row)) {
+        sum += faulty_[row];
+        continue;
+      }
+      const double variance = spread(f, row);
+      const double square = squared(f, row) / variance;
+      if (!(square >= 0.0 && square < -kDiverged)) return kDiverged;
+      const double area = 2.0 * kPi * variance;
+      const bool wheel = row >= kWheelRow && row < kAccelRow;
+      // Is it no more than of a faulty sensor? log(x) < x / 8 + 1.1.
+      if (!wheel && square + 0.125 * area + 1.1 > -2.0 * shaken_[row]) {
+        sum += contaminated(row, -0.5 * (std::log(area) + square));
+      } else {
+        squares += square;
+        product *= area;
+      }
+    }
+    sum -= 0.5 * (std::log(product) + squares);
+    return sum > kDiverged ? sum : kDiverged;
+  }
+
+  double most_of(double sum) const noexcept {
+    return std::max(sum + shaken_most_ + kRounding, 3.0 - kOutlier) + 0.05;  // log(1 + exp(-3)) < 0.05
+  }
+
   /// A faulty sensor reads anything in its range; half of the faulty encoders stand still.
   double log_faulty(std::size_t row, const Sample& came) const noexcept {
     if (row < 3) return -std::log(2.0 * kGyroRange_rad_s);
@@ -242,9 +285,11 @@ class Evidence {
   std::array<double, 3> innovation_{};    // of the gyro, a tick ago
   double expected_ = 0.0;                 // log density of what is expected
   std::array<double, kRows> peak_{};      // of it, by row
+  double shaken_most_ = 0.0;              // what could be above it
   std::array<double, kRows> variance_{};  // a tick ago
   bool knows_less_ = true;
   std::array<double, kRows> faulty_{};  // log densities, of this tick
+  std::array<double, kRows> shaken_{};  // of a sample of the IMU that is shaken
   Sample before_;                       // a tick ago
   bool known_ = false;
   std::array<int, static_cast<std::size_t>(Wheels)> still_{};

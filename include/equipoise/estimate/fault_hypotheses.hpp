@@ -38,6 +38,9 @@ struct FaultHypothesis {
   constexpr bool healthy() const noexcept { return kind >= kSpin; }
   constexpr bool pushes() const noexcept { return kind == kPush || kind == kRock; }
   constexpr bool waits() const noexcept { return kind == kBias || kind == kEvent; }  // to be begun
+  constexpr bool leaves_out() const noexcept {
+    return kind == kWheel || kind == kWheels || kind == kAxis || kind == kImu || kind == kRock;
+  }
   constexpr bool wiring() const noexcept { return kind == kReversed || kind == kSwap; }
 };
 

@@ -52,6 +52,13 @@ struct FaultMember {
     ratio = std::max(ratio - nats, least);
     apart = true;
   }
+  /// What a tick says for it at most.
+  template <class Evidence, class Sample>
+  double most(const FaultHypothesis& h, const Evidence& weigh, const Sample& all,
+              const Sample& z) const noexcept {
+    if (h.kind == FaultHypothesis::kNoise) return weigh.most(all, kNoise_rad_s, kNoise_m_s2);
+    return h.leaves_out() ? weigh.most(all, used.of(z), z) : Evidence::kOutlier;
+  }
   void refute(double to) noexcept {
     ratio = to;
     owes = false;

@@ -210,7 +210,7 @@ class SensorFaults {
     } else {
       anew = anew || (h.healthy() && ticks_ - m.since > kEventTicks);
       if (kRocks && anew && h.healthy()) members_[kCount - 1].keep(m);
-      const double most = (anew ? 0.0 : m.ratio) + weigh_.most(all, m.used.of(z), z) - as_used;
+      const double most = (anew ? 0.0 : m.ratio) + m.most(h, weigh_, all, z) - as_used;
       if (most <= -kMargin && (anew || !m.apart)) return m.refute(-kMargin);
     }
     ++ran_;

@@ -77,6 +77,43 @@ TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
       << "a sensor more: anything";
 }
 
+TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
+  using TheEvidence = Evidence<Told, 3>;
+  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.0);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  const Sample all = at_rest();
+  for (int k = 0; k < 20000; ++k) {
+    Told everything, noisy;
+    for (std::size_t row = 0; row < 8; ++row) {
+      everything.variance[row] = std::pow(10.0, -6.0 + 7.0 * share(random));
+      const double noise = row < 3 ? 0.15 : row < 6 ? 0.0 : 3.0;
+      noisy.variance[row] = everything.variance[row] + noise * noise;
+    }
+    evidence.expect(everything, all, all);
+    const double says = evidence(noisy, all, all);
+    ASSERT_LE(says, evidence.most(all, 0.15, 3.0)) << k;
+  }
+}
+
+TEST(Evidence, OneLogarithmSaysAsMuchAsOneForEachRow) {
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  evidence.reset(0.0);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  const Sample z = at_rest();
+  for (int k = 0; k < 20000; ++k) {
+    Told filter;
+    for (std::size_t row = 0; row < 8; ++row) {
+      filter.variance[row] = std::pow(10.0, -6.0 + 8.0 * share(random));
+      filter.innovation[row] = 12.0 * share(random) * share(random) * std::sqrt(filter.variance[row]);
+    }
+    const double by_row = evidence.expect(filter, z, z);
+    ASSERT_NEAR(evidence(filter, z, z), by_row, 1e-11) << k;
+  }
+}
+
 TEST(Evidence, KnowsWhenTheFilterHasBecomeLessSure) {
   Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
   evidence.reset(0.0);
