@@ -256,8 +256,8 @@ def performance_page(root: Path) -> str:
         "tick of the robot as built (world `built2025`) turning at 1 Hz; the dense filter is the same "
         "model in `KalmanFilter`, fixed-size Eigen, in the same binary. The detector runs a filter per "
         "hypothesis that it cannot refute without (sensor_faults.hpp): how many ran in a tick is counted, "
-        "too, and each is a dense one in the dense tick. tools/test fails when a count on x86 grows by more than "
-        "3 %, tools/cross-test when one on the Cortex-A8 does.",
+        "too, and each is a dense one in the dense tick. tools/test fails when a count on x86 grows by more "
+        "than 3 %, tools/cross-test when one on the Cortex-A8 does.",
         "",
         *table(counts),
         "",
