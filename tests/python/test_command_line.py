@@ -73,6 +73,18 @@ def test_every_command_and_option_is_in_the_manual(binary, helps, tmp_path):
                 assert f"`{option}" in section, (words, option)
 
 
+def test_the_reference_explains_every_option_and_its_examples_have_what_is_required(binary):
+    markdown = run(binary, "man", "--to", "markdown").stdout
+    for section in markdown.split("\n## ")[1:]:
+        example = section.split("```sh\n")[1].split("\n```")[0] if "```sh" in section else ""
+        for names, text in re.findall(r"^\| `(.*?)`(?: \w+)? \| (.*) \|$", section, re.M):
+            where = section.splitlines()[0], names
+            assert re.match(r"(?!From [-\d]|Default:|Required|One of:|May be repeated)\S", text), where
+            if re.search(r"\bRequired[.;]", text) and names.startswith("-"):
+                assert any(name.split()[0] in example for name in names.split("`, `")), where
+    assert re.search(r"`--robot TEXT` \| mbbr or mip\. Required; one of: mbbr, mip\. \|", markdown)
+
+
 def test_manual_pages_are_clean_roff(binary, tmp_path):
     if shutil.which("groff") is None:
         pytest.skip("needs groff; lintian looks at the pages, too")

@@ -58,11 +58,18 @@ std::string facts(const OptionDescription& o) {
 }
 
 std::string sentence(std::string text) {
-  const bool named = text.substr(0, text.find(' ')).find(':') != std::string::npos;  // "mbbr: ..."
-  if (!text.empty() && !named)
-    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-  if (!text.empty() && text.back() != '.') text += '.';
+  if (text.empty()) return text;
+  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (text.back() != '.' && text.back() != '?') text += '.';
   return text;
+}
+
+/// A help that begins with a value keeps it as it is typed: "mbbr: ...", "dmp or own".
+std::string help_of(const OptionDescription& o) {
+  const std::string first = o.help.substr(0, o.help.find_first_of(" ,;"));
+  const bool value = first.find_first_of(":_") != std::string::npos ||
+                     std::find(o.choices.begin(), o.choices.end(), first) != o.choices.end();
+  return value ? o.help + "." : sentence(o.help);
 }
 
 std::vector<OptionDescription> sorted(const Command& c, bool positional) {
@@ -82,7 +89,7 @@ void roff_options(std::ostringstream& out, const Command& c) {
       for (const std::string& name : o.names)
         out << (&name == o.names.data() ? "" : ", ") << "\\fB" << roff(name) << "\\fR";
       if (!o.value.empty() && !positional) out << " \\fI" << roff(o.value) << "\\fR";
-      out << "\n" << roff(sentence(o.help.empty() ? o.value : o.help)) << "\n";
+      out << "\n" << roff(help_of(o)) << "\n";
       if (const std::string known = facts(o); !known.empty()) out << roff(sentence(known)) << "\n";
     }
   }
@@ -138,7 +145,7 @@ std::string reference_page(const Command& program) {
       for (const std::string& name : o.names) names += (names.empty() ? "" : "`, `") + name;
       if (!o.value.empty() && !o.positional) names += " " + o.value;
       const std::string known = facts(o);
-      out << "| `" << names << "` | " << cell(sentence(o.help))
+      out << "| `" << names << "` | " << cell(help_of(o))
           << (known.empty() ? "" : " " + cell(sentence(known))) << " |\n";
     }
   });

@@ -105,10 +105,9 @@ int run_bringup(const BringupArguments& a) {
 
 void add_bringup(Subcommand app) {
   const Subcommand command =
-      app.subcommand(
-             "bringup",
-             "First power-up, guided: tiny pulses on the stand find the wiring, a board file comes out")
-          .example("equipoise bringup --config config/mbbr.toml --out board.toml");
+      app.subcommand("bringup", "Finds the wiring by short pulses on the stand, and writes a board file")
+          .example(
+              "equipoise bringup --config config/mbbr.toml --board config/boards/robotics_cape_mbbr.toml");
   auto a = std::make_shared<BringupArguments>();
   add_options(command, &a->commissioning);
   command.option("--out", a->out, "board file to write; its calibration goes beside it")

@@ -70,8 +70,8 @@ Result calibrate_accel(Commissioning& commissioning, CalibrationFile* file, nloh
     const Vec3 accel = pose(*manual, commissioning.calibration(), &temperature);
     const int face = face_up(accel);
     if (face < 0 || seen[static_cast<std::size_t>(face)]) {
-      std::fprintf(stderr,
-                   face < 0 ? "no side is up to 25 degrees; again\n" : "that side was up before; again\n");
+      std::fprintf(stderr, face < 0 ? "no face within 25 degrees of vertical; try again\n"
+                                    : "that face was measured before; try another\n");
       continue;
     }
     seen[static_cast<std::size_t>(face)] = true;

@@ -213,7 +213,7 @@ void settle(ManualDrive& manual, const WheelLayout& layout, std::vector<WheelFin
     char way = 0;
     if (std::sscanf(answer.c_str(), "%d %c", &wheel, &way) != 2 || wheel < 1 || wheel > layout.wheels ||
         (way != 'f' && way != 'b')) {
-      throw JobError("\"" + answer + "\" is no answer like \"1 f\"; nothing was written");
+      throw JobError("\"" + answer + "\": expected wheel and f or b, e.g. 1 f; nothing was written");
     }
     if (!f.wheel) f.wheel = wheel - 1;
     if (!f.turns_backwards) f.turns_backwards = way == 'b';

@@ -105,7 +105,7 @@ Stillness ManualDrive::hold_still(double seconds) {
 std::string ManualDrive::ask(const Request& request) {
   off();
   std::string answer;
-  if (!ask_(request, &answer)) throw JobError("stopped by the person; nothing was written");
+  if (!ask_(request, &answer)) throw JobError("cancelled; nothing was written");
   return answer;
 }
 

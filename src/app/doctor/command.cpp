@@ -68,8 +68,7 @@ int run_doctor(const Arguments& a) {
 
 void add_doctor(Subcommand app) {
   const Subcommand command =
-      app.subcommand("doctor",
-                     "Finds what keeps this machine from running a robot, and the command that mends it")
+      app.subcommand("doctor", "Checks whether this machine can run a robot, and suggests fixes")
           .example("equipoise doctor --board board.toml");
   auto a = std::make_shared<Arguments>();
   command.option("--board", a->board, "wiring, TOML: also look at everything it names").file();

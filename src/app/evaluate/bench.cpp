@@ -161,8 +161,12 @@ void add_bench(Subcommand app) {
           .example("equipoise bench --config config/mbbr.toml");
   auto a = std::make_shared<BenchArguments>();
   command.option("--config", a->config, "robot configuration").file().show_default();
-  command.option("--ticks", a->ticks, "to time").show_default().range(200, 1000000);
-  command.option("--wakes", a->wakes, "of 5 ms, each way").show_default().range(10, 100000);
+  command.option("--ticks", a->ticks, "ticks to measure").show_default().range(200, 1000000);
+  command
+      .option("--wakes", a->wakes,
+              "wake-ups to measure, 5 ms apart, of the loop and of a bare clock_nanosleep")
+      .show_default()
+      .range(10, 100000);
   command.option("--json", a->json, "results as JSON, - for stdout").file();
   command.action([=] { return run(*a); });
 }

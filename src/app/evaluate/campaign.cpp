@@ -197,22 +197,24 @@ int campaign(const CampaignArguments& a) {
 
 void add_campaign(Subcommand app) {
   const Subcommand command =
-      app.subcommand("campaign", "Breaks every part in every phase of a run, in simulated time")
+      app.subcommand("campaign",
+                     "Runs a fault-injection campaign: every fault in every phase of a simulated run")
           .example("equipoise campaign --config config/mbbr.toml --seeds 3 --fault imu_off");
   auto a = std::make_shared<CampaignArguments>();
   command.option("--config", a->config, "robot configuration").file().required();
   command.option("--seeds", a->seeds, "runs per case").show_default().range(1, 1000);
-  command.option("--seed", a->seed, "the first; each robot and run takes the next").show_default();
-  command.option("--fidelity", a->fidelity, "of the world").show_default();
+  command.option("--seed", a->seed, "seed of the first run; each robot and run takes the next")
+      .show_default();
+  command.option("--fidelity", a->fidelity, "the simulated world").show_default();
   command.option("--controller", a->controller,
                  "which controller balances (default: the robot's): " + known_controllers());
-  command.option("--robot", a->robot, "of the population, the first; 0: the typical one").show_default();
-  command.option("--robots", a->robots, "of the population").show_default().range(1, 100000);
+  command.option("--robot", a->robot, "first robot of the population; 0: the typical one").show_default();
+  command.option("--robots", a->robots, "number of robots of the population").show_default().range(1, 100000);
   std::vector<std::string> faults;
   faults.reserve(kFaults.size());
   for (const FaultInfo& fault : kFaults) faults.emplace_back(fault.name);
-  command.option("--fault", a->faults, "only these").one_of(faults);
-  command.option("--phase", a->phases, "only these").one_of({kPhaseNames.begin(), kPhaseNames.end()});
+  command.option("--fault", a->faults, "only these faults").one_of(faults);
+  command.option("--phase", a->phases, "only these phases").one_of({kPhaseNames.begin(), kPhaseNames.end()});
   command.option("--set", a->set, "override a configuration key");
   command.option("--jobs", a->jobs, "threads; 0: one per core. The results do not depend on it")
       .show_default()
@@ -220,7 +222,7 @@ void add_campaign(Subcommand app) {
   command.option("--after-s", a->after_s, "how long a run goes on after its fault; 0: until 5.5 s")
       .show_default()
       .range(0.0, 3600.0);
-  command.option("--soak-hours", a->soak_h, "then random runs, hours of robot time")
+  command.option("--soak-hours", a->soak_h, "random runs afterwards, hours of robot time")
       .show_default()
       .range(0.0, 10000.0);
   command.option("--json", a->json, "cases as JSON, - for stdout").file();

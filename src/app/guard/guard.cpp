@@ -130,7 +130,7 @@ int run(const Arguments& a) {
 void add_guard(Subcommand app) {
   const Subcommand command =
       app.subcommand("guard", "Stops the motors when the loop is dead, stopped or hanging")
-          .example("equipoise guard --board board.toml");
+          .example("equipoise guard --heartbeat-fd 3 --board board.toml");
   auto a = std::make_shared<Arguments>();
   command.option("--heartbeat-fd", a->heartbeat_fd, "descriptor of the page on which the loop beats")
       .required();

@@ -14,8 +14,10 @@ void add_friction_rig(Subcommand app) {
   auto p = std::make_shared<FrictionRigParams>();
   auto log = std::make_shared<std::string>();
   command.option("--log", *log, "LCM event log, for identify friction").file().required();
-  command.option("--coulomb-N-m", p->coulomb_N_m).show_default().range(0.0, 1.0);
-  command.option("--viscous-N-m-s", p->viscous_N_m_s).show_default().range(0.0, 1.0);
+  command.option("--coulomb-N-m", p->coulomb_N_m, "Coulomb friction, N m").show_default().range(0.0, 1.0);
+  command.option("--viscous-N-m-s", p->viscous_N_m_s, "viscous friction, N m s")
+      .show_default()
+      .range(0.0, 1.0);
   command.option("--radius-ratio", p->radius_ratio, "flywheel's radius over the ball's")
       .show_default()
       .range(0.01, 100.0);
@@ -25,8 +27,10 @@ void add_friction_rig(Subcommand app) {
   command.option("--negative-scale", p->negative_scale, "Coulomb friction backwards over forwards")
       .show_default()
       .range(0.1, 10.0);
-  command.option("--amplitude-u", p->amplitude_u).show_default().range(0.0, 3.0);
-  command.option("--seed", p->seed).show_default();
+  command.option("--amplitude-u", p->amplitude_u, "amplitude of the sweep, as u")
+      .show_default()
+      .range(0.0, 3.0);
+  command.option("--seed", p->seed, "seed of every random number").show_default();
   command.action([=] {
     BenchLog out;
     out.axis = 1;

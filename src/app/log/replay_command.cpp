@@ -174,8 +174,8 @@ void add_replay(Subcommand app) {
   command.option("log", a->log, "LCM event log of sim or run; its further parts are found").file().required();
   command.option("--estimator", a->beside.estimator,
                  "run this one beside it; errors against the log's truth");
-  const Option set = command.option(
-      "--set", a->beside.set, "key=value: run this tuning beside it, e.g. noise or weights; may be repeated");
+  const Option set =
+      command.option("--set", a->beside.set, "key=value: run this tuning beside it, e.g. noise or weights");
   command.option("--log", a->beside.log, "with --set: log of what this tuning would have done")
       .file()
       .needs(set);

@@ -15,14 +15,14 @@ void add_keygen(Subcommand app) {
     bool rotate = false;
   };
   const Subcommand command =
-      app.subcommand("keygen", "Makes the key of a robot, or of one who may command it")
+      app.subcommand("keygen", "Makes the key of a robot, or of a user who may command it")
           .example("equipoise keygen robot.key --robot mbbr-1");
   auto a = std::make_shared<Arguments>();
   command.option("file", a->path, "new file, for its owner only; copy a robot's to the robot")
       .file()
       .required();
   const Option robot = command.option("--robot", a->robot, "the robot's name").show_default();
-  const Option holder = command.option("--holder", a->holder, "a key for this person, from the robot's own");
+  const Option holder = command.option("--holder", a->holder, "a key for this user, from the robot's own");
   const Option from = command.option("--from", a->from, "the robot's own key").file().needs(holder);
   const Option rotate = command.flag(
       "--rotate", a->rotate, "a new secret in a robot's file: its holders need new keys from then on");

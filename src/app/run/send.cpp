@@ -66,7 +66,7 @@ void add_send(Subcommand app) {
       throw InputError("--live: what to do comes from stdin");
     a->disarm = arm.given() && !a->arm;
     if (a->disarm && (motion || a->heading_reset))
-      throw InputError("--disarm: a robot that is off goes nowhere");
+      throw InputError("--disarm cannot be combined with motion options");
     a->drive = motion || duration.given() || !(arm.given() || a->heading_reset);
     return send(*a);
   });

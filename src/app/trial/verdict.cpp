@@ -63,7 +63,7 @@ std::string Verdict::sentence() const {
       std::snprintf(text, sizeof text, "Fell over at %.2f s", fell_at_s);
       return text + why;
     case Ended::kDisarmed:
-      std::snprintf(text, sizeof text, "The motors were off while asked for at %.2f s", fell_at_s);
+      std::snprintf(text, sizeof text, "Disarmed unexpectedly at %.2f s", fell_at_s);
       return text + why;
     case Ended::kInterrupted:
       std::snprintf(text, sizeof text, "Interrupted after %.1f s", duration_s);

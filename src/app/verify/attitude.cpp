@@ -15,7 +15,7 @@ void add_attitude(Subcommand app) {
       .option("--in", *in,
               "rows {gyro_rad_s, accel_m_s2}, body axes, specific force; mag, any unit, optional")
       .required();
-  command.option("--rate-hz", *rate_hz, "of the rows").show_default().range(10.0, 10e3);
+  command.option("--rate-hz", *rate_hz, "sample rate of the rows, Hz").show_default().range(10.0, 10e3);
   command.option("--lever-arm-m", *arm, "from the point that moves least to the IMU: x y z").count(3);
   command.option("--accel-time-constant-s", *average_s, "over which the specific force is averaged")
       .show_default()

@@ -67,7 +67,7 @@ void add_design(Subcommand app) {
   command.option("--estimator", r.estimator, "filter in the loop (default: ekf)");
   command.option("--controller", r.controller, "mbbr: thesis, scheduled; mip: slc, lqr");
   command.option("--last-hz", r.last_hz, "highest yaw rate").show_default().range(0.0, 10.0);
-  command.option("--step-hz", r.step_hz, "between yaw rates").show_default().range(0.01, 10.0);
+  command.option("--step-hz", r.step_hz, "step between yaw rates").show_default().range(0.01, 10.0);
   command.flag("--bode", r.bode, "with the frequency responses, in the JSON");
   command.option("--json", a->json, "output file, - for stdout").file();
   command.action([a] {

@@ -23,7 +23,7 @@ void add_geometry(Subcommand app) {
       .range(-90.0, 90.0);
   command.option(
       "--axes", *axes,
-      "x y z of the wheels' axes, wheel 1 first, as measured or of a 3-D model: names a wrong order, sign "
+      "the wheels' axes as x y z, wheel 1 first, as measured or of a 3-D model: names a wrong order, sign "
       "or azimuth (exit status 1)");
   command.option("--json", *json, "output file, - for stdout").file();
   command.action([=] {

@@ -58,7 +58,7 @@ const std::map<std::string, Model>& models() {
 
 void add_model(Subcommand app) {
   const Subcommand command =
-      app.subcommand("model", "Evaluates the exact plant, printed parameters, on rows of JSON")
+      app.subcommand("model", "Evaluates the exact plant, published parameters, on rows of JSON")
           .example("equipoise model --robot mbbr --in rows.json --json -");
   auto robot = std::make_shared<std::string>();
   auto in = std::make_shared<std::string>();

@@ -37,7 +37,7 @@ TEST(Verdict, MotorsOffWhileAskedForIsDisarmedAndKeepsItsReason) {
   EXPECT_TRUE(v.fell());
   EXPECT_EQ(v.fell_at_s, 3.2);
   EXPECT_EQ(v.reasons, kImuStale);
-  EXPECT_EQ(v.sentence(), "The motors were off while asked for at 3.20 s: imu_stale");
+  EXPECT_EQ(v.sentence(), "Disarmed unexpectedly at 3.20 s: imu_stale");
 }
 
 TEST(Verdict, TheTruthDecidesWhetherARobotFell) {
