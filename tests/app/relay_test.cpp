@@ -229,19 +229,6 @@ TEST_F(Relay, ALineWithoutEndEndsIt) {
   EXPECT_TRUE(soon([&] { return returned_.load(); }));
 }
 
-TEST_F(Relay, WhoWritesWithoutEndIsObeyed) {
-  start(kQuick, requests_[0]);
-  std::string many;
-  for (int i = 0; i < 1000; ++i) many += "drive 0.2 0 0\n";
-  std::atomic<bool> enough{false};
-  std::thread writer([&] {
-    while (!enough) say(many);
-  });
-  EXPECT_TRUE(soon([&] { return tick().velocity_W_m_s.x() == 0.2; }));
-  enough = true;
-  writer.join();
-}
-
 TEST_F(Relay, ALineThatIsNoRequestIsNamed) {
   start(kQuick, requests_[0]);
   say("jump\n");

@@ -134,11 +134,7 @@ void Conversation::relay(int requests) {
   };
 
   const auto read_requests = [&lines](std::vector<LiveRequest>* requested) {
-    constexpr std::size_t kAtMost =
-        1U << 18U;  // more than a pipe holds; who writes without end is not waited for
-    while (requested->size() < kAtMost) {
-      const auto line = lines.next();
-      if (!line) return;
+    while (const auto line = lines.next()) {
       const auto request = live_request(*line);
       if (!request)
         throw InputError("--live: '" + *line +
