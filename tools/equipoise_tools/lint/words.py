@@ -45,7 +45,6 @@ CODE = (*PRODUCT, "tests/", "tools/equipoise_tools/", "python/", "examples/")
 COCKPIT = "tools/equipoise_tools/cockpit/page/"
 SAYS_OLD_WORDS = ("tools/equipoise_tools/lint/words.py", "tests/python/test_lint.py")
 JSON_KEYS_KEPT = '"flights"'
-UNREVISED = ("docs/faults.md",)  # is rewritten with the detector
 GENERATED = ("docs/experiments/", "docs/reports/", "docs/parameters.md", "docs/reasons.md")
 _MESSAGE = re.compile(r'"((?:[^"\\\n]|\\.)+)"')  # a string
 _INTERNAL = re.compile(r"^\s*(?://|#include)|static_assert\(")
@@ -89,8 +88,7 @@ def found(name: str, text: str, patterns: Terms) -> list[Finding]:
 def words(tree: Tree) -> list[Finding]:
     findings = []
     for name in pages(tree):
-        if name not in UNREVISED:
-            findings += found(name, without_code(tree.text(name)), TERMS)
+        findings += found(name, without_code(tree.text(name)), TERMS)
     for name in tree.ending(*C_SUFFIXES, ".py", ".js", ".sh"):
         if not name.startswith(CODE) or name in SAYS_OLD_WORDS:
             continue
