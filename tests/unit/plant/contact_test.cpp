@@ -242,30 +242,6 @@ TEST(Contacts, MoveTheRobotAsBodiesThatTouchDoInMuJoCo) {
   }
 }
 
-TEST(RollingResistance, SlowsBothRobots) {
-  const auto rolled = [](double resistance) {
-    MbbrWorldParams w = quiet();
-    w.common.friction = false;
-    w.common.rolling_resistance = resistance;
-    w.common.floor_slope_rad = Vec2(0.02, 0.0);
-    return std::abs(World(w).run({0.0, 0.0, 0.0}, 20).position_m().x());
-  };
-  EXPECT_LT(rolled(0.01), 0.8 * rolled(0.0));
-  const auto driven = [](double resistance) {
-    MipWorldParams w;
-    w.common.initial_tilt_rad = 0.0;
-    w.common.friction = false;
-    w.common.rolling_resistance = resistance;
-    w.common.floor_slope_rad = Vec2(0.0, 0.05);
-    MipWorld world(MipParameters(), MotorParameters(), Calibration(), w);
-    MotorCommand command{};
-    command.enable = true;
-    for (int i = 0; i < 10; ++i) world.advance(command);
-    return std::abs(world.truth().position_W_m.y());
-  };
-  EXPECT_LT(driven(0.02), 0.8 * driven(0.0));
-}
-
 TEST(Gyro, ScaleErrorAndWarmingUpAddToWhatItFeels) {
   MbbrWorldParams w = quiet();
   World plain(w);

@@ -94,24 +94,6 @@ TEST(MbbrDisturbance, YawFrictionDependsOnTheDirectionOfSpin) {
   EXPECT_NEAR(friction_limit_N_m(w, 0.05, Vec3(0, 0, -1)).x(), 0.05, 1e-15);
 }
 
-TEST(MbbrDisturbance, ExtraFrictionSlowsTheSpin) {
-  const double plain = spin_after(quiet(), 1.0);
-  MbbrWorldParams viscous = quiet();
-  viscous.extra_viscous_N_m_s = 0.01;
-  EXPECT_LT(spin_after(viscous, 1.0), 0.98 * plain);
-  MbbrWorldParams rough = quiet();
-  rough.coulomb_scale = 1.5;
-  EXPECT_LT(spin_after(rough, 1.0), 0.98 * plain);
-}
-
-TEST(MbbrDisturbance, TorqueImbalanceTurnsTheRobotAside) {
-  MbbrWorldParams w = quiet();
-  w.common.friction = false;
-  EXPECT_LT(World(w).run(kSpin, 10).truth().phi.norm(), 1e-9);  // equal motors only spin
-  w.drive.wheel_torque_scale = Vec3(1.0575, 0.9425, 1.0);       // 11.5 %, [T] section 5.3
-  EXPECT_GT(World(w).run(kSpin, 10).truth().phi.norm(), 1e-4);
-}
-
 TEST(MbbrDisturbance, DiodeDropMatchesTheSwitchingMotor) {
   SwitchedMotorParams p;
   p.diode_drop_V = 0.8;
@@ -144,14 +126,6 @@ TEST(MbbrDisturbance, DiodeDropTakesTorqueFromPartialDuty) {
   EXPECT_LT(std::abs(World(w).run({0.5, 0.5, 0.5}, 20).truth().theta_z), 0.98 * plain);
 }
 
-TEST(MbbrDisturbance, TheBatterySagsUnderLoad) {
-  MbbrWorldParams w = quiet();
-  EXPECT_EQ(World(w).run(kSpin, 1).battery_V(), w.common.battery_V);
-  w.common.battery_resistance_ohm = 0.15;
-  // Three motors near stall at 0.9 of 2.36 A each, 0.9 of the time from the supply.
-  EXPECT_NEAR(w.common.battery_V - World(w).run(kSpin, 1).battery_V(), 0.15 * 3.0 * 0.81 * 2.36, 0.15);
-}
-
 TEST(MbbrDisturbance, ContactsAreUnitNormalsPerpendicularToTheAxes) {
   const MbbrParameters robot;
   const Mat3 contacts = wheel_contacts(robot);
@@ -172,21 +146,6 @@ TEST(MbbrDisturbance, RowsAlternateTwelveTimesPerTurn) {
     before = now;
   }
   EXPECT_EQ(changes, 23);  // both rows, twelve rollers each, less the start of the turn
-}
-
-TEST(MbbrDisturbance, RollerTiltTurnsSomeTranslationIntoYaw) {
-  MbbrWorldParams w = quiet();
-  const double plain = World(w).run(kTip, 10).truth().theta_z;
-  w.drive.roller_tilt_rad = 0.1;
-  EXPECT_GT(std::abs(World(w).run(kTip, 10).truth().theta_z - plain), 1e-4);
-}
-
-TEST(MbbrDisturbance, RollerSlipRipplesTheTorque) {
-  MbbrWorldParams w = quiet();
-  w.common.friction = false;
-  const Vec2 plain = World(w).run(kTip, 10).truth().theta_xy;
-  w.drive.roller_slip_N_m = 0.01;
-  EXPECT_GT((World(w).run(kTip, 10).truth().theta_xy - plain).norm(), 1e-5);
 }
 
 TEST(MbbrDisturbance, BacklashPassesNothingUntilTheGapIsCrossed) {
@@ -234,17 +193,6 @@ TEST(MbbrDisturbance, SlippingWheelsReportMoreThanTheBallTurned) {
   slips.run(kSpin, 10);
   EXPECT_LT(std::abs(slips.truth().theta_z), 0.7 * std::abs(grips.truth().theta_z));
   EXPECT_GT(slips.seen_spin_rad(), -slips.truth().theta_z + 0.1);
-}
-
-TEST(MbbrDisturbance, ASlopeRollsTheRobotDownhill) {
-  MbbrWorldParams w = quiet();
-  w.common.friction = false;
-  w.common.floor_slope_rad = Vec2(0.02, 0.0);  // rises towards +x
-  World world(w);
-  world.run({0.0, 0.0, 0.0}, 20);
-  const Vec2 position = ball_velocity(MbbrParameters().r, world.truth().phi);
-  EXPECT_LT(position.x(), -1e-4);
-  EXPECT_NEAR(position.y(), 0.0, 1e-9);
 }
 
 TEST(MbbrDisturbance, APushMovesTheRobotAndTheAccelerometerFeelsIt) {
