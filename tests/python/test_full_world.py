@@ -1,0 +1,84 @@
+"""Every effect of the population can be turned off; two engines' verdicts are compared run by run."""
+
+import tomllib
+
+from equipoise_tools import agreement, full_world
+
+
+def leaves(table, prefix=""):
+    for name, value in table.items():
+        if isinstance(value, dict) and "sigma" not in value:
+            yield from leaves(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name
+
+
+def test_every_key_of_the_population_is_an_effects(root):
+    config = tomllib.loads((root / "config/mbbr.toml").read_text())
+    off = {key for keys in full_world.EFFECTS.values() for key in keys}
+    drawn = set(leaves(config["population"]))
+    # How strongly or when, of an effect whose other key turns it off.
+    of_others = {
+        "vibration.excess_kurtosis",
+        "floor.heading_rad",
+        "random_pushes.force_N",
+        "disturbance.gearbox_friction_share",
+        "disturbance.floor_torsion_radius_m",
+        "disturbance.imu_delay_scale",
+        "disturbance.friction_time_s",
+        "disturbance.warm_K",
+        "disturbance.warm_up_K",
+    }
+    assert drawn - off == of_others
+    world = set(leaves(config["world"]["full"]))
+    assert off <= world
+
+
+def test_effects_alone_leave_the_others_out(tmp_path, monkeypatch):
+    asked = []
+
+    def trials(command, **_):
+        asked.append([command[i + 1] for i, word in enumerate(command) if word == "--set"])
+        (tmp_path / command[command.index("--json") + 1]).write_text('{"trials": []}')
+        return type("Done", (), {"returncode": 0})
+
+    monkeypatch.setattr(full_world.subprocess, "run", trials)
+    monkeypatch.setattr(full_world, "binary", lambda: "equipoise")
+    runs = full_world.Trials(tmp_path, range(1, 3))
+    runs.run("mbbr", "firmware", (0.0, 0.0), "alone wheel slip+pushes")
+    runs.run("mbbr", "firmware", (0.0, 0.0), "without pushes")
+    runs.run("mbbr", "firmware", (0.0, 0.0), "without pushes")  # there already
+    assert "world.full.disturbance.wheel_grip=0" not in asked[0]
+    assert "world.full.random_pushes.every_s=0" not in asked[0]
+    assert "world.full.disturbance.backlash_rad=0" in asked[0]
+    assert asked[1:] == [["world.full.random_pushes.every_s=0"]]
+
+
+def row(robot, reason="", error=0.01):
+    return {
+        "robot": robot,
+        "seed": robot,
+        "yaw_hz": 1.0,
+        "drive_mps": 0.2,
+        "fell": bool(reason),
+        "reasons": [reason] if reason else [],
+        "ended": "finished",
+        "attitude_rmse_rad": error,
+        "yaw_frame_speed_rmse_m_s": 2.0 * error,
+    }
+
+
+def test_engines_are_compared_run_by_run():
+    own = [row(1), row(2), row(3, "tilt"), row(4)]
+    other = [row(1, error=0.02), row(2, "imu_untrusted"), row(3, "tilt"), row(5)]
+    text = "\n".join(agreement.compared(own, other))
+    assert "| 1, 0.2 | 3 | 1 | 1 | 1 | 0 | 2.00, 2.00 |" in text
+    assert "2 of 3 verdicts are the same" in text
+    assert "- 1: ours upright, MuJoCo's imu_untrusted; robots 2" in text
+
+
+def test_our_calm_floor_is_level_and_nothing_pushes(root):
+    settings = agreement.calm(str(root / "config/mbbr.toml"), "full")
+    assert "world.full.random_pushes.every_s=0" in settings
+    assert "world.full.disturbance.floor_slope_rad=[0,0]" in settings
+    assert "world.full.floor.sill_m=0" in settings
