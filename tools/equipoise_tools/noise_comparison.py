@@ -22,7 +22,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import butter, sosfiltfilt
 from scipy.stats import kurtosis, rankdata
 
-from .paths import UserError, repository_root
+from .foreign_log import configuration
+from .paths import UserError, binary, repository_root
 
 HZ = 200
 HIGH_PASS_HZ = 20.0
@@ -33,7 +34,7 @@ MOTIONS = {
     "standing": (14.8, 20.2),
     "rolling": (2.9, 5.4),
 }  # s; rolling: on casters
-ROLLING_M_S = 0.3
+ROLLING_RAD_S = 14.8  # of its wheels then
 
 
 def segway(path: Path) -> np.ndarray:
@@ -53,18 +54,15 @@ def real_motions(path: Path) -> dict[str, np.ndarray]:
     return {name: picked[int(HZ * begin) : int(HZ * end)] for name, (begin, end) in MOTIONS.items()}
 
 
-def simulated(
-    binary: Path, config: Path, robot: int, settings: list[str], *, drive_mps: float, duration_s: float
-) -> np.ndarray:
+def simulated(program: Path, config: Path, robot: int, settings: list[str], words: str) -> np.ndarray:
     """The same of a robot of the population; each has its own seed."""
     with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
         log = Path(folder) / "run.lcm"
         command = f"sim --config {config} --fidelity full --robot {robot} --seed {robot} --telemetry off"
         # How it shakes is asked, not who falls: nothing is judged.
-        command += f" --estimator truth --set safety.detection=false --log {log}"
-        command += f" --drive-mps {drive_mps} --duration-s {duration_s} --json -"
-        words = [str(binary), *command.split()] + [word for text in settings for word in ("--set", text)]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        command += f" --set safety.detection=false --log {log} --duration-s 12 --json - {words}"
+        call = [str(program), *command.split()] + [word for text in settings for word in ("--set", text)]
+        done = subprocess.run(call, capture_output=True, text=True, check=False)
         if done.returncode not in (0, 1):  # 1: fell
             raise UserError(done.stderr.strip())
         records = Log(log)[ch.SENSORS]
@@ -76,16 +74,20 @@ def simulated(
 
 
 def simulated_motions(
-    binary: Path, config: Path, robot: int, settings: list[str] | None = None
+    program: Path, config: Path, robot: int, settings: list[str] | None = None
 ) -> dict[str, np.ndarray]:
-    standing = simulated(binary, config, robot, settings or [], drive_mps=0.0, duration_s=12.0)
-    rolling = simulated(binary, config, robot, settings or [], drive_mps=ROLLING_M_S, duration_s=12.0)
+    """Standing by its own filter, as real robots do; rolling as on casters, which do not balance."""
+    given = settings or []
+    standing = simulated(program, config, robot, given, "--drive-mps 0")
+    speed = ROLLING_RAD_S * configuration(config)["robot"]["wheel_radius_m"]
+    rolling = simulated(program, config, robot, given, f"--estimator truth --drive-mps {speed}")
     return {"rest": standing[: HZ // 2], "standing": standing[3 * HZ :], "rolling": rolling[5 * HZ :]}
 
 
-def whole(motions: dict[str, np.ndarray]) -> bool:
-    """Neither run was cut short by a fall."""
-    return all(len(motions[name]) >= 2 * HZ for name in ("standing", "rolling"))
+def whole(made: list[dict[str, np.ndarray]], motion: str) -> list[np.ndarray]:
+    """Of the robots whose run was not cut short by a fall."""
+    least = HZ // 2 if motion == "rest" else 2 * HZ
+    return [robot[motion] for robot in made if len(robot[motion]) >= least]
 
 
 def high_passed(samples: np.ndarray) -> np.ndarray:
@@ -130,11 +132,25 @@ def told_apart(real: np.ndarray, made: np.ndarray, folds: int = 5) -> float:
     return area_under_curve(scores, is_real)
 
 
+def each_alone(real: np.ndarray, made: np.ndarray) -> dict[str, float]:
+    """AUC of each feature by itself, the most telling first; below 0.5: less of it in the real log."""
+    is_real = np.arange(len(real) + len(made)) < len(real)
+    names = [f"{what} {axis}" for what in ("sigma", "lag-1", "kurtosis") for axis in AXES]
+    aucs = {
+        name: area_under_curve(column, is_real)
+        for name, column in zip(names, np.vstack([real, made]).T, strict=True)
+    }
+    return dict(sorted(aucs.items(), key=lambda item: -abs(item[1] - 0.5)))
+
+
 def compare(real: dict[str, np.ndarray], made: list[dict[str, np.ndarray]]) -> dict:
     result: dict = {}
     for name, samples in real.items():
         sigma = high_passed(samples).std(axis=0)
-        drawn = np.array([high_passed(robot[name]).std(axis=0) for robot in made])
+        runs = whole(made, name)
+        if not runs:
+            raise UserError(f"{name}: no simulated robot stayed up")
+        drawn = np.array([high_passed(run).std(axis=0) for run in runs])
         low, middle, high = np.quantile(drawn, [0.0, 0.5, 1.0], axis=0)
         outside = np.maximum(np.maximum(low / sigma, sigma / high), 1.0)
         result[name] = {
@@ -147,9 +163,10 @@ def compare(real: dict[str, np.ndarray], made: list[dict[str, np.ndarray]]) -> d
         }
         windows = features(samples)
         if name != "rest" and len(windows) >= 4:
-            others = np.vstack([features(robot[name]) for robot in made])
+            others = np.vstack([features(run) for run in runs])
             result[name] |= {"real_windows": len(windows), "simulated_windows": len(others)}
             result[name]["auc"] = told_apart(windows, others, folds=min(5, len(windows) // 2))
+            result[name]["features"] = each_alone(windows, others)
     return result
 
 
@@ -166,6 +183,8 @@ def page(result: dict) -> str:
         for axis, row in motion["quantities"].items():
             made = ", ".join(f"{value:.4f}" for value in row["simulated"])
             lines.append(f"| {axis} | {row['real']:.4f} | {made} | x {row['outside_by']:.1f} |")
+        telling = ", ".join(f"{axis} {auc:.2f}" for axis, auc in [*motion.get("features", {}).items()][:6])
+        lines += ["", f"Alone: {telling}"] if telling else []
         lines.append("")
     return "\n".join(lines)
 
@@ -180,9 +199,9 @@ def main(words: list[str] | None = None) -> int:
     given = parser.parse_args(words)
     if not given.log.exists():
         parser.error(f"{given.log}: cannot be opened")
-    binary = repository_root() / "build/host/equipoise"
-    made = [simulated_motions(binary, given.config, robot, given.set) for robot in range(1, given.robots + 1)]
-    made = [motions for motions in made if whole(motions)]
+    program = binary()
+    robots = range(1, given.robots + 1)
+    made = [simulated_motions(program, given.config, robot, given.set) for robot in robots]
     result = compare(real_motions(given.log), made)
     if given.json:
         given.json.write_text(json.dumps(result, indent=1) + "\n")
