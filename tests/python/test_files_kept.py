@@ -1,6 +1,7 @@
 """What users have is not overwritten, and what is no file is not waited for."""
 
 import os
+import resource
 import shutil
 import subprocess
 
@@ -89,6 +90,18 @@ def test_json_replaces_json_only(do, log, root, tmp_path):
     (tmp_path / "out.json").write_text(" \n")
     do(*sim, "out.json", status=0)
     do(*sim, "out.json", status=0)
+
+
+def test_half_a_json_is_not_left_in_the_way(do, root, tmp_path):
+    config = root / "config/edumip.toml"
+    command = ["sim", "--config", config, "--duration-s", "1", "--log", "off", "--json", "out.json"]
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        assert "out.json: cannot be written" in do(*command, status=2)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    do(*command, status=0)
 
 
 @pytest.mark.parametrize(

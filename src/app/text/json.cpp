@@ -40,7 +40,11 @@ void write_json(const nlohmann::json& value, const std::string& path) {
   if (const std::string error = json_output_error(path); !error.empty()) throw InputError(error);
   std::ofstream file(path);
   file << text;
-  if (!file.flush()) throw InputError(path + ": cannot be written");
+  if (file.flush()) return;
+  file.close();
+  std::error_code ignored;  // half of it is no JSON, which the next result would not replace
+  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
+  throw InputError(path + ": cannot be written");
 }
 
 }  // namespace equipoise::app
