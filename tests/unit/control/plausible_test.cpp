@@ -74,6 +74,7 @@ TEST(WithoutMargin, ThePhaseMustBeThirtyDegrees) {
     ASSERT_TRUE(problem) << phase_deg;
     EXPECT_NE(problem->why.find("phase margin"), std::string::npos) << problem->why;
   }
+  EXPECT_TRUE(integrator(kTickS, -62.0)) << "where the loop crosses at 1 rad/s, too";
 }
 
 TEST(WithoutMargin, AGainOnTheInputBeforeIsPartOfTheLoop) {
