@@ -2,6 +2,7 @@
 // usage: instruction_count ROBOT CONFIG PART TIMES
 //   run      ticks of the simulated robot and the pipeline, armed after 100, turning at 1 Hz
 //   ticks    the same, and the recorded samples once more through a fresh pipeline
+//   alone-run, alone-ticks  the same without the detector and its filters
 //   mode-M   ticks in mode M, played again; count_plugin.c looks at the later half of them, which lie between
 //            tick_begins() and tick_ends()
 //   filters  ticks; says how often the default filter ran, with the bank that looks for a lying encoder
@@ -74,7 +75,9 @@ void ticks(const std::string& file, int times, const std::string& part) {
   choice.estimator = Firmware::kDefaultEstimator;
   choice.controller = Firmware::kDefaultController;
   choice.fidelity = "built2025";  // what earlier counts were taken in
-  const auto config = Firmware::apply(Firmware::load(file, {}).config, choice);
+  const bool alone = part.rfind("alone-", 0) == 0;
+  const std::vector<std::string> overrides(alone ? 1 : 0, "safety.detection=false");
+  const auto config = Firmware::apply(Firmware::load(file, overrides).config, choice);
   runtime::RecordedSamples recording;
   recording.samples.reserve(static_cast<std::size_t>(times));
   auto world = Firmware::world(config, fidelity_level(choice.fidelity), 1);
@@ -86,7 +89,7 @@ void ticks(const std::string& file, int times, const std::string& part) {
     (void)runtime::run_loop(io, pipeline, commands, nobody, never);
     if (io.motors.enable == 0) throw ConfigError(file + ": the robot is not balancing at the end of the run");
   });
-  if (part == "run") return;
+  if (part == "run" || part == "alone-run") return;
   long filters = 0;
   Firmware::with_pipeline(config, choice.controller, [&](auto& pipeline) {
     const auto count = [&](auto&&...) { filters += pipeline.estimators().filters(); };
@@ -274,13 +277,15 @@ void bridges(const std::string& how, int times) {
 
 template <class Firmware>
 void count(const std::string& file, const std::string& part, int times) {
-  if (part == "run" || part == "ticks" || part == "filters") return ticks<Firmware>(file, times, part);
+  if (part == "run" || part == "ticks" || part == "filters" || part.rfind("alone-", 0) == 0)
+    return ticks<Firmware>(file, times, part);
   if (part.rfind("mode-", 0) == 0) return in_mode<Firmware>(file, times, part.substr(5));
   if (part.rfind("plant-", 0) == 0) return plant<Firmware>(file, part.substr(6), times);
   if (part == "packed" || part == "dense") return filter(file, part, times, Firmware{});
   if (part == "bridge" || part == "newton") return bridges(part, times);
-  throw std::runtime_error(
-      part + ": no part; run, ticks, mode-MODE, filters, plant-FIDELITY, packed, dense, bridge or newton");
+  throw std::runtime_error(part +
+                           ": no part; run, ticks, alone-run, alone-ticks, mode-MODE, filters, "
+                           "plant-FIDELITY, packed, dense, bridge or newton");
 }
 
 }  // namespace

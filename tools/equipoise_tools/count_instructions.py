@@ -242,11 +242,16 @@ def costs(machine, robot: str) -> dict:
         "tick": tick,
         "filters": filters,
         "filter": packed,
-        "tick_of_one_filter": tick - (filters - 1) * packed,
+        "tick_of_one_filter": alone(machine.total, robot),
         "simulated_tick": run,
         "log": log,
         "stages": stages,
     }
+
+
+def alone(count, robot: str) -> float:
+    """A tick without the detector and its filters."""
+    return per(count, robot, "alone-ticks", TICKS) - per(count, robot, "alone-run", TICKS)
 
 
 def cycles(machine: CortexA8, robot: str, filters: float) -> dict:
@@ -254,9 +259,11 @@ def cycles(machine: CortexA8, robot: str, filters: float) -> dict:
     packed, dense = (per(machine.cycles, robot, part, STEPS) for part in ("packed", "dense"))
     tick = ticks - run
     dense_tick = tick + filters * (dense - packed)
+    bank = tick - alone(machine.cycles, robot)
     return {
         "tick_cycles": round(tick),
         "filter_cycles": round(packed),
+        "bank_in_filters": round(bank / packed, 2),
         "dense_filter_cycles": round(dense),
         "dense_tick_cycles": round(dense_tick),
         "cycles_ratio": round(tick / dense_tick, 4),
@@ -305,11 +312,13 @@ def count_all(root: Path) -> dict:
     load = firmware_load(log.read_text(encoding="utf-8")) if log.is_file() else None
     if load is None:  # what was counted last
         before = json.loads((root / TABLE).read_text(encoding="utf-8"))
-        result["firmware"], result["firmware_commit"] = before["firmware"], before["firmware_commit"]
+        result |= {k: before[k] for k in ("firmware", "firmware_commit", "firmware_tick")}
     else:
         commit = ["git", "-C", str(root), "rev-parse", "--short=7", "HEAD"]
         told = subprocess.run(commit, capture_output=True, text=True, check=True).stdout
         result["firmware"], result["firmware_commit"] = load, told.strip()
+        a8 = result["cortex_a8"]
+        result["firmware_tick"] = {r: a8[r]["tick"] for r in ROBOTS} if a8 else None
     return result
 
 

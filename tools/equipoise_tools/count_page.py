@@ -89,6 +89,7 @@ def cycle_tables(robots: dict) -> list[str]:
         "|---|---|---|",
         row("tick", lambda r: f"{r['tick_cycles']:,}"),
         row("the default filter", lambda r: f"{r['filter_cycles']:,}"),
+        row("all hypotheses, in such filters", lambda r: f"{r['bank_in_filters']:.1f}"),
         row("the same filter, dense Eigen, double", lambda r: f"{r['dense_filter_cycles']:,}"),
         row("tick with dense filters", lambda r: f"{r['dense_tick_cycles']:,}"),
         row("tick over that", lambda r: f"{r['cycles_ratio']:.4f}"),
@@ -131,15 +132,12 @@ def a8_load(robots: dict) -> list[str]:
     ]
 
 
-def whole_load(firmware: dict, robots: dict) -> dict[str, dict[int, float | None]]:
-    """Of 1 GHz, by the cycles that an instruction outside the tick is taken to need. None: the loop was
-    counted with another tick, it does not hold this one."""
-    load: dict[str, dict[int, float | None]] = {}
+def whole_load(firmware: dict, ticks: dict, robots: dict) -> dict[str, dict[int, float]]:
+    """Of 1 GHz, by the cycles that an instruction outside the tick is taken to need. `ticks`: instructions of
+    those that the firmware was counted with."""
+    load: dict[str, dict[int, float]] = {}
     for robot in ROBOTS:
-        if firmware[robot]["loop"] < robots[robot]["tick"]:
-            load[robot] = dict.fromkeys(CYCLES_OUTSIDE)
-            continue
-        cycles, outside = robots[robot]["tick_cycles"], sum(firmware[robot].values()) - robots[robot]["tick"]
+        cycles, outside = robots[robot]["tick_cycles"], sum(firmware[robot].values()) - ticks[robot]
         load[robot] = {n: (n * outside + cycles) * TICK_HZ / CLOCK_HZ for n in CYCLES_OUTSIDE}
     return load
 
@@ -161,10 +159,10 @@ def firmware_table(counts: dict) -> list[str]:
     for label, key in rows:
         lines.append(f"| {label} | " + " | ".join(f"{firmware[r][key]:,}" for r in ROBOTS) + " |")
     lines.append("| sum | " + " | ".join(f"{sum(firmware[r].values()):,}" for r in ROBOTS) + " |")
-    if robots is not None:
-        load = whole_load(firmware, robots)
+    if robots is not None and counts["firmware_tick"] is not None:
+        load = whole_load(firmware, counts["firmware_tick"], robots)
         for n in CYCLES_OUTSIDE:
-            cells = " | ".join("not counted" if load[r][n] is None else f"{load[r][n]:.1%}" for r in ROBOTS)
+            cells = " | ".join(f"{load[r][n]:.1%}" for r in ROBOTS)
             lines.append(f"| load of 1 GHz, {n} cycles for an instruction outside the tick | {cells} |")
     return [
         *lines,
