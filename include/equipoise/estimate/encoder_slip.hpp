@@ -12,6 +12,8 @@
 
 namespace equipoise {
 
+constexpr double kSigmas = 2.0;  // NIS of real logs reaches 4 without any slip: docs/reality.md
+
 /// `counts(wheels)`: what turning the wheels alone adds to the counted angles, states from `first_state` on.
 /// True where a variance was widened: the correction has to be found anew.
 template <int Wheels, class Filter, class Counts>
@@ -19,7 +21,7 @@ bool widen_by_slip(Filter& filter, int first_row, int first_state, const Counts&
   bool slipped = false;
   for (int i = 0; i < Wheels; ++i) {
     const auto row = static_cast<std::size_t>(first_row) + static_cast<std::size_t>(i);
-    const double beyond = (std::sqrt(filter.row_nis()[row]) - 1.0) * filter.row_variance()[row];
+    const double beyond = (std::sqrt(filter.row_nis()[row]) / kSigmas - 1.0) * filter.row_variance()[row];
     if (!(beyond > 0.0)) continue;  // unused, as expected, or not a number
     filter.widen(first_state, counts(Vec<Wheels>::Unit(i)), beyond);
     slipped = true;

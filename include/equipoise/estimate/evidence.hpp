@@ -128,6 +128,8 @@ class Evidence {
 
   /// Of the gyro, one sigma.
   double vibration_rad_s() const noexcept { return std::sqrt(vibration_); }
+  /// What is less than a jump of its bias.
+  double least_jump_rad_s() const noexcept { return std::max(kLeastJump_rad_s, 3.0 * vibration_rad_s()); }
   bool known() const noexcept { return known_; }
   const Sample& before() const noexcept { return before_; }
   /// Ticks since an encoder has counted.
@@ -188,11 +190,12 @@ class Evidence {
   static constexpr double kOutlier = 12.0;  // nats, that one tick may say at most
 
  private:
-  static constexpr double kModelError = 2.0;      // NIS of real logs reaches 4: docs/reality.md
-  static constexpr double kShaken = 0.05;         // share of an IMU's samples beyond five sigma, real logs
-  static constexpr double kFelt = 0.5;            // of an accelerometer's, that feel what pushes the body
-  static constexpr double kVibrationMean = 0.01;  // half a second
-  static constexpr double kMedianOfThree = 0.6;   // of squared normal numbers
+  static constexpr double kLeastJump_rad_s = 0.1;  // the filter's own bias learns less
+  static constexpr double kModelError = 2.0;       // NIS of real logs reaches 4: docs/reality.md
+  static constexpr double kShaken = 0.05;          // share of an IMU's samples beyond five sigma, real logs
+  static constexpr double kFelt = 0.5;             // of an accelerometer's, that feel what pushes the body
+  static constexpr double kVibrationMean = 0.01;   // half a second
+  static constexpr double kMedianOfThree = 0.6;    // of squared normal numbers
   static constexpr double kMostVibration_rad_s = 0.1;  // real robots that roll
   static constexpr double kGyroRange_rad_s = 2.0;      // a faulty axis reads anything within: a body's rates
   static constexpr double kAccelRange_m_s2 = 10.0;

@@ -41,6 +41,11 @@ struct FaultHypothesis {
   constexpr bool leaves_out() const noexcept {
     return kind == kWheel || kind == kWheels || kind == kAxis || kind == kImu || kind == kRock;
   }
+  /// What is broken stays so; a blow or a slip that looks like it does not. `stops`: swapped, it falls
+  /// before.
+  constexpr bool lasts(bool stops) const noexcept {
+    return kind <= kWheels || kind == (stops ? kAxis : kBias);
+  }
   constexpr bool wiring() const noexcept { return kind == kReversed || kind == kSwap; }
 };
 

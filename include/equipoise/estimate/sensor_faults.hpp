@@ -65,9 +65,11 @@ class SensorFaults {
     evidence_ = {-1, 0.0, kBound, -1, 0.0, false, ticks_++ == 0 ? 0 : evidence_.verdicts};
     ran_ = 2;
     const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
+    heard_ = used_.with_axes(rocking()).of(z);
+    goes_on_ = false;
     hear_vibration(control, {});
     control.predict(u);
-    control.update(used_.with_axes(rocking()).of(z));
+    control.update(heard_);
     if (!raw.imu_ok || !raw.encoders_ok) {  // nothing to weigh against each other
       healthy_.predict(u);
       healthy_.update(used_.of(z));
@@ -84,6 +86,9 @@ class SensorFaults {
 
   /// What the verdicts are compared with.
   const Filter& healthy() const noexcept { return healthy_; }
+  /// What the control's filter was corrected by, and that it then went on from another.
+  const Sample& heard() const noexcept { return heard_; }
+  bool goes_on() const noexcept { return goes_on_; }
   bool trusted() const noexcept { return trusted_ && gross_.trusted(); }
   std::uint32_t excluded_wheels() const noexcept { return used_.without_wheels; }
   bool gyro_axis_excluded() const noexcept {
@@ -120,7 +125,6 @@ class SensorFaults {
   static constexpr int kRocking = 400;      // no body rocks for longer
   static constexpr int kStillTicks = 4;     // of an encoder that stands
   // Events and faults.
-  static constexpr double kLeastJump_rad_s = 0.1;  // the filter's own bias learns less
   static constexpr double kJump_rad_s = 0.3;
   static constexpr double kBias_rad_s = 0.1;  // uncertain after a jump: the noise of one sample
 
@@ -196,7 +200,7 @@ class SensorFaults {
     const FaultHypothesis& h = kHypotheses[i];
     Member& m = members_[i];
     if (h.kind == FaultHypothesis::kBias &&
-        Evidence::off_rad_s(healthy_, all, p_.balances) > least_jump_rad_s()) {
+        Evidence::off_rad_s(healthy_, all, p_.balances) > weigh_.least_jump_rad_s()) {
       // A jump of the gyro's bias (Willsky and Jones 1976)? What it follows already is no new one, unless the
       // axes that balance say so.
       const double three = weigh_.jump(healthy_, all, {true, true, true}, kJump_rad_s);
@@ -224,7 +228,7 @@ class SensorFaults {
     if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
     m.ratio += gain;
     if (!(m.ratio > -kMargin)) m.refute(-kMargin);
-    if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < least_jump_rad_s()) m.refute(-kMargin);
+    if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < weigh_.least_jump_rad_s()) m.refute(-kMargin);
   }
 
   /// Of the gyro's bias, on the axis that it has moved most. What is smaller the filter's own bias learns:
@@ -233,10 +237,6 @@ class SensorFaults {
     Vec3 d = m.used.bias_rad_s - used_.bias_rad_s;
     for (int k = 0; k < Filter::kBiases; ++k) d(k) += m.settled().gyro_bias(k) - healthy_.gyro_bias(k);
     return d.cwiseAbs().maxCoeff();
-  }
-
-  double least_jump_rad_s() const noexcept {
-    return std::max(kLeastJump_rad_s, 3.0 * weigh_.vibration_rad_s());
   }
 
   void jumped(std::size_t i, const Input& u, const Sample& z, double ratio) noexcept {
@@ -329,14 +329,16 @@ class SensorFaults {
       if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) stop(best, runner_up);
       return;
     }
-    // A bias or a dead axis stays, a blow that looks like one does not. Swapped, it falls before.
-    const auto lasts = leads == kStop ? FaultHypothesis::kAxis : FaultHypothesis::kBias;
-    if (kHypotheses[best].kind == lasts && leads_for_ < kPatience) return;
+    if (kHypotheses[best].lasts(leads == kStop) && leads_for_ < kPatience) return;
     if (leads == kStop) return stop(best, best);
     use(best);
-    control.adopt(healthy_);
+    go_on(control);
   }
 
+  void go_on(Filter& control) noexcept {
+    control.adopt(healthy_);
+    goes_on_ = true;
+  }
   /// One of them is true; the robot cannot go on with either.
   void stop(std::size_t one, std::size_t other) noexcept {
     evidence_.leading = kRows[one];
@@ -349,7 +351,7 @@ class SensorFaults {
   /// The control's filter takes a push by its own input noise; it knows of no noisier samples.
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].settled());
-    if (!kHypotheses[event].pushes()) control.adopt(healthy_);
+    if (!kHypotheses[event].pushes()) go_on(control);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.depart(ratio, -kMargin);
     begin(event, healthy_);
@@ -385,13 +387,12 @@ class SensorFaults {
   Filter predicted_;  // without this tick's samples
   std::array<Member, kCount> members_;
   Used used_;
+  Sample heard_;
   FaultEvidence evidence_;
   std::array<double, 3> quiet_{};  // the gyro's variances
   bool stale_ = true;              // members have missed a tick
-  bool trusted_ = true, suspects_ = false;
-  bool stood_still_ = false;   // the encoder that was excluded last
-  int ticks_ = 0, jumps_ = 0;  // since arming
-  int ran_ = 1;                // filters, in this tick
+  bool trusted_ = true, suspects_ = false, goes_on_ = false, stood_still_ = false;
+  int ticks_ = 0, jumps_ = 0, ran_ = 1;  // since arming; filters in this tick
   int excluded_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
   std::size_t leader_ = 0;
 };

@@ -58,9 +58,7 @@ class FaultTolerant {
       : params_(params),
         kinematics_(params.robot),
         ekf_(params.robot, params.ekf),
-        faults_(Filter(params.robot, evidence), faults) {
-    ekf_.let_encoders_slip(!params.detection);  // else the detector judges what an encoder does to the filter
-  }
+        faults_(Filter(params.robot, evidence), faults) {}
 
   static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
   Estimate& at(Id id) noexcept { return estimates_[index(id)]; }

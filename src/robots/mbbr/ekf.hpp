@@ -144,7 +144,7 @@ class MbbrEkf {
   Filter filter_;
   Vec2 per_push_;  // change of tilt and ball rate in a tick, per N
   TimeBase<3, 3> time_;
-  bool encoders_slip_ = false;
+  bool encoders_slip_ = true;
   double gyro_bias_z_ = 0.0;
   double heading_ = 0.0;
   Turn direction_{0.0};  // of it

@@ -39,13 +39,17 @@ MbbrEstimators::MbbrEstimators(const Params& params)
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()
                               : MbbrLinearModel(params.robot, params.kf_yaw_transport),
-          params.kf) {}
+          params.kf),
+      rolling_(ekf_) {
+  rolling_.let_encoders_slip(false);
+}
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);
   const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
 
   start_filter(tilt, z);
+  rolling_.adopt(ekf_);
   turned_lately_rad_s_ = 0.0;
 
   Vec<13> x13 = Vec<13>::Zero();
@@ -73,6 +77,7 @@ void MbbrEstimators::start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_
   rest_bias_.tell(gyro_bias_B_rad_s);
   start(z);
   start_filter_moving(tilt_rad, gyro_bias_B_rad_s, z);
+  rolling_.adopt(ekf_);
 }
 
 /// Heading and inertial ball angles, [T] (6.3)-(6.4).
@@ -85,14 +90,17 @@ void MbbrEstimators::integrate(Id id, double heading_rate) noexcept {
 void MbbrEstimators::step_ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   MbbrEstimate& x = at(Id::kEkf);
   step_filter(z, u, x.omega_B);
-  if (params_.detection) watch_bias(x.omega_B.z());
+  if (params_.detection) watch_bias(u, x.omega_B.z());
   x = ekf_.estimate();
 }
 
 /// What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
-void MbbrEstimators::watch_bias(double turns_rad_s) noexcept {
+void MbbrEstimators::watch_bias(const Vec3& u, double turns_rad_s) noexcept {
+  rolling_.predict(u);
+  rolling_.update(faults_.heard());
+  if (faults_.goes_on()) rolling_.adopt(ekf_);
   turned_lately_rad_s_ += kTickS / kLately_s * (turns_rad_s - turned_lately_rad_s_);
-  bias_drift_.update(ekf_.gyro_biases(), kMountError_rad * std::abs(turns_rad_s),
+  bias_drift_.update(rolling_.gyro_biases(), kMountError_rad * std::abs(turns_rad_s),
                      kSuddenTurn_rad * std::abs(turns_rad_s - turned_lately_rad_s_));
 }
 

@@ -154,7 +154,7 @@ class MipEkf {
   double per_hit_ = 0.0;  // change of yaw rate in a tick, per N
   Vec2 per_push_;         // change of tilt and wheel rate in a tick, per N
   TimeBase<2, 2> time_;
-  bool encoders_slip_ = false;
+  bool encoders_slip_ = true;
   Vec2 gyro_bias_yz_ = Vec2::Zero();
   double heading_ = 0.0;
   bool pushed_ = false;

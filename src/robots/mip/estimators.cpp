@@ -28,9 +28,7 @@ MipEstimators::MipEstimators(const Params& params)
     : FaultTolerant(params, sensor_faults(params), evidence(params.ekf)),
       complementary_kf_(MipInclinometerModel{}, params.complementary_kf),
       planar_kf_(MipPlanarModel(params.robot), params.planar_kf),
-      ekf_published_(MipPublishedModel{}, params.ekf_published) {
-  ekf_.let_encoders_slip(true);  // the gyro alone tells the tilt; the detector's filter does not slip
-}
+      ekf_published_(MipPublishedModel{}, params.ekf_published) {}
 
 void MipEstimators::start(const Mip::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);

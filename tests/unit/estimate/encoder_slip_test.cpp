@@ -32,7 +32,6 @@ TEST(EncoderSlip, AWheelThatSlipsMovesNoBall) {
   const double most_rad_s = kTickS * load_N * p.r / (p.I_b + p.m_b * p.r * p.r);
   for (int wheel = 0; wheel < 3; ++wheel) {
     MbbrEkf filter(p, config.estimators.ekf);
-    filter.let_encoders_slip(true);
     filter.start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
     auto z = at_rest<Mbbr::Sample>();
     for (int k = 1; k <= 220; ++k) {
@@ -55,7 +54,6 @@ TEST(EncoderSlip, AMotorInItsBacklashMovesNoWheel) {
   const double most_rad_s = kTickS * p.k1 / (p.I_w1 + (p.m_w + 0.5 * p.m_b) * p.r * p.r);
   for (const double other : {0.0, 1.0}) {
     MipEkf filter(p, config.estimators.ekf);
-    filter.let_encoders_slip(true);
     filter.start(0.0, Vec3::Zero(), Vec2::Zero());
     auto z = at_rest<Mip::Sample>();
     for (int k = 1; k <= 200; ++k) {
