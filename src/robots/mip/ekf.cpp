@@ -11,6 +11,7 @@ namespace {
 // are in doubt by so much a tick. By the mean of all rows instead, what a lying gyro says would pass for a
 // push (25 of 3840 runs unsafe); at 15, or with ten times the variance, lqr keeps itself shaking. Chosen on
 // robots 1 to 80 (lies) and 101 to 150 (1 to 4 N for 50 ms, and without).
+constexpr double kSlips = 1.0;  // standard deviations of a wheel's innovation: the gyro alone tells the tilt
 constexpr double kPushNis = 30.0;
 constexpr double kPushTiltRateVariance = 0.005;
 constexpr double kPushWheelRateVariance = 0.1;
@@ -280,7 +281,7 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
   const auto counts = [this](const Vec2& wheels) {
     return Vec2(kinematics_.phi(wheels), kinematics_.psi(wheels));
   };
-  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, counts))
+  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, kSlips, counts))
     filter_.weigh_again(time_.acted(), y, use);
 }
 
