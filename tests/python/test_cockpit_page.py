@@ -125,7 +125,7 @@ def test_arms_drives_stops_and_survives_a_restart(page, cockpit):
     # The firmware dies; its successor is disarmed, and answers the same page.
     os.kill(cockpit.firmware(), signal.SIGKILL)
     until(lambda: "ended" in text(page, "#firmware"), "the page says that the firmware has ended")
-    until(lambda: "no robot" in text(page, "#arm-state").lower(), "the page shows no stale state")
+    until(lambda: "no telemetry" in text(page, "#arm-state").lower(), "the page shows no stale state")
     starts = shown(page, "cockpit.status.simulated.starts")
     page.click("#restart")
     until(lambda: shown(page, "cockpit.status.simulated.starts") == starts + 1, "it starts anew")
