@@ -11,10 +11,10 @@ namespace {
 // are in doubt by so much a tick. By the mean of all rows instead, what a lying gyro says would pass for a
 // push (25 of 3840 runs unsafe); at 15, or with ten times the variance, lqr keeps itself shaking. Chosen on
 // robots 1 to 80 (lies) and 101 to 150 (1 to 4 N for 50 ms, and without).
-constexpr double kSlips = 1.0;  // standard deviations of a wheel's innovation: the gyro alone tells the tilt
 constexpr double kPushNis = 30.0;
 constexpr double kPushTiltRateVariance = 0.005;
 constexpr double kPushWheelRateVariance = 0.1;
+constexpr double kSlips = 1.0;  // standard deviations of a wheel's innovation: the gyro alone tells the tilt
 constexpr int kSettling = 100;  // ticks after arming: the robot shakes by itself until it knows its mount
 // A robot on two wheels turns about y only as it leans in a turn: a y that is five sigma off lies, or a wheel
 // rolls over something. Either way it says nothing about the tilt for a while.
