@@ -12,10 +12,11 @@ TOOLS = {
     'PATH="$ROBOT/bin:$PATH"; export PATH; exec sh -c "$*"',
 }
 ROBOT = {
-    "dpkg": "echo ${ARCHITECTURE:-armhf}",
+    "dpkg": 'case "$*" in *--configure*) rm -f "$ROBOT/interrupted" ;; *) echo ${ARCHITECTURE:-armhf} ;; esac',
     "id": "echo 0",
     "env": "shift; exec $*",
-    "apt-get": 'for last; do :; done; grep -q broken "$last" && exit 100; cp "$last" "$ROBOT/installed"',
+    "apt-get": 'for last; do :; done; [ ! -e "$ROBOT/interrupted" ] || exit 100\n'
+    'grep -q broken "$last" && exit 100; cp "$last" "$ROBOT/installed"',
     "equipoise": 'grep -q crashes "$ROBOT/installed" && exit 1; echo 0.1.0',
     "systemctl": 'echo "$*" >>"$ROBOT/systemctl.log"; [ "$1" != is-active ] || [ -e "$ROBOT/running" ]',
 }
@@ -75,6 +76,13 @@ def test_a_package_that_does_not_work_is_replaced_by_the_one_before(root, robot,
     assert installed(robot) == "good"
     assert flash(root, robot, "--rollback", "bone").returncode == 1  # a bad package is never "previous"
     assert installed(robot) == "good"
+
+
+def test_an_installation_that_was_interrupted_is_finished_first(root, robot, tmp_path):
+    (robot / "interrupted").touch()
+    ended = flash(root, robot, "--package", package(tmp_path, "first"), "bone")
+    assert ended.returncode == 0, ended.stderr
+    assert installed(robot) == "first"
 
 
 def test_a_running_robot_is_left_alone(root, robot, tmp_path):

@@ -85,6 +85,20 @@ def test_a_release_refuses_uncommitted_changes_and_other_versions(clone):
     assert release(clone, "--preset", "sparc").returncode == 2
 
 
+@pytest.mark.parametrize("command", ["release", "sysroot"])
+def test_a_folder_of_something_else_is_not_replaced(clone, root, tmp_path, command):
+    shutil.copy(root / "tools/lib/foreign_apt.sh", clone / "tools/lib")
+    shutil.copy(root / f"tools/{command}", clone / "tools")
+    for occupied in ("thesis", "new.new"):
+        (tmp_path / occupied).mkdir()
+        (tmp_path / occupied / "chapter").write_text("mine")
+    for output in (tmp_path / "thesis", *[tmp_path / "new"][: command == "sysroot"]):
+        asked = [clone / "tools" / command, "--output", output]
+        refused = subprocess.run(asked, capture_output=True, text=True)
+        assert refused.returncode == 2 and "was not made by this command" in refused.stderr
+    assert (tmp_path / "thesis/chapter").exists() and (tmp_path / "new.new/chapter").exists()
+
+
 def test_the_hosted_workflow_runs_the_commands_of_the_readme(root):
     jobs = yaml.safe_load((root / ".github/workflows/test.yml").read_text())["jobs"]
     run = [

@@ -59,7 +59,7 @@ def machine(tmp_path, root):
             if name not in without:
                 (programs / name).write_text(f"#!/bin/sh\n{body}\n")
                 (programs / name).chmod(0o755)
-        tools = ("awk", "bash", "cat", "dirname", "env", "grep", "mkdir", "nproc", "rm", "sh", "tee", "touch")
+        tools = ("awk", "bash", "cat", "dirname", "env", "grep", "mkdir", "mv", "nproc", "rm", "sh", "tee", "touch")
         for name in tools:
             (programs / name).unlink(missing_ok=True)
             (programs / name).symlink_to(
@@ -130,6 +130,18 @@ def test_a_build_folder_of_another_tree_is_made_anew(machine, tmp_path):
     assert [call.split(" -j")[0] for call in third] == calls
     assert "build/host was made for another folder" in result.stderr
     assert not (tree / "build/host/equipoise").exists()
+
+
+def test_package_lists_of_another_tree_are_fetched_anew(machine, tmp_path, root):
+    lists = tmp_path / "tree/build/apt/bookworm-armhf"
+    lists.mkdir(parents=True)
+    (lists / "apt.conf").write_text('Dir::State "/somewhere/else/build/apt/bookworm-armhf";\n')
+    source = f"source {root}/tools/lib/foreign_apt.sh; machine_mirror() {{ echo mirror; }}; "
+    for update in ([" update"], []):
+        result, calls = machine(script=source + "foreign_apt armhf bookworm install x")
+        assert result.returncode == 0, result.stderr
+        assert calls == [*update, " install x"]
+    assert "somewhere" not in (lists / "apt.conf").read_text()
 
 
 BESIDE = """

@@ -9,8 +9,9 @@ say() { printf 'robot: %s\n' "$*" >&2; }
 as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo -n "$@"; fi; }
 service_runs() { systemctl is-active --quiet equipoise.service; }
 
-# install_package FILE: installed, and the program starts.
+# install_package FILE: installed, and the program starts; after an installation that was interrupted, too.
 install_package() {
+  as_root env DEBIAN_FRONTEND=noninteractive dpkg --force-confold --configure -a >&2
   as_root env DEBIAN_FRONTEND=noninteractive apt-get -q install -y --allow-downgrades --reinstall \
     -o Dpkg::Options::=--force-confold "$store/$1" >&2 && equipoise --version >&2
 }

@@ -21,7 +21,7 @@ foreign_apt() {
   local architecture=$1 suite=$2 apt_root
   shift 2
   apt_root=$root/build/apt/$suite-$architecture
-  if [ ! -f "$apt_root/apt.conf" ]; then
+  if ! grep -qsxF "Dir::State \"$apt_root\";" "$apt_root/apt.conf"; then # absent, or copied along with its tree
     local mirror keyring=/usr/share/keyrings/debian-archive-keyring.gpg
     mirror=$(machine_mirror)
     [ -n "$mirror" ] || die "no Debian mirror among this machine's apt sources (apt-get update first?)"

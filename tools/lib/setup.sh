@@ -68,6 +68,12 @@ as_root() {
   fi
 }
 
+# may_replace OPTION DIRECTORY: a folder in the way is empty or was made by the same command, whose mark it has.
+may_replace() {
+  [ ! -e "$2" ] || [ -f "$2/.equipoise" ] || { [ -d "$2" ] && [ -z "$(ls -A "$2")" ]; } ||
+    bad_usage "$1 $2: exists and was not made by this command; choose another name"
+}
+
 # packages_of GROUP...: the names listed under [GROUP] in packages.txt.
 packages_of() {
   awk -v groups=" $* " '
