@@ -30,6 +30,25 @@ void refuse_deep_nesting(const std::string& text, const std::string& origin) {
   }
 }
 
+/// At which names of files, and messages, would end.
+void refuse_zero_characters(const toml::node& node, const std::string& where) {
+  const auto refuse_in = [&](std::string_view text, const toml::node& holder) {
+    if (text.find('\0') == std::string_view::npos) return;
+    throw ConfigError((where.empty() ? "" : at(where, holder.source()) + ": ") +
+                      "a text holds a zero character");
+  };
+  if (const auto* text = node.as_string()) refuse_in(text->get(), node);
+  if (const auto* array = node.as_array()) {
+    for (const toml::node& element : *array) refuse_zero_characters(element, where);
+  }
+  if (const auto* table = node.as_table()) {
+    for (const auto& [key, value] : *table) {
+      refuse_in(key.str(), value);
+      refuse_zero_characters(value, where);
+    }
+  }
+}
+
 /// Replaces values of `root` by those of a fragment.
 void merge(toml::table& root, toml::table&& fragment, const std::string& path, const std::string& where) {
   for (auto&& entry : fragment) {
@@ -198,7 +217,9 @@ std::string at(const std::string& path, const toml::source_region& where) {
 toml::table parsed_text(const std::string& text, const std::string& origin) {
   refuse_deep_nesting(text, origin);
   try {
-    return toml::parse(text, origin);
+    toml::table table = toml::parse(text, origin);
+    refuse_zero_characters(table, origin);
+    return table;
   } catch (const toml::parse_error& error) {
     const std::string where = origin.empty() ? "" : at(origin, error.source()) + ": ";
     throw ConfigError(where + std::string(error.description()));

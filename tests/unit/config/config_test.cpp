@@ -152,6 +152,14 @@ TEST(Config, WhatNoOverrideCanBeIsRefusedInOneShortLine) {
   }
 }
 
+TEST(Config, ATextAtWhoseZeroCharacterANameWouldEndIsRefusedWithItsLine) {
+  for (const char* line : {R"(include = ["motor\u0000.toml"])", R"(base = "mbbr.toml\u0000.old")",
+                           R"("a\u0000b" = 1)", R"(a = [{b = "\U00000000"}])"}) {
+    const EditedConfig edited("[robot]", std::string(line) + "\n[robot]");
+    EXPECT_EQ(error_of(edited.path()), edited.where() + " a text holds a zero character");
+  }
+}
+
 TEST(Config, AFileThatIsNestedTooDeepIsRefusedWithItsLine) {
   std::string deep = "a";
   while (deep.size() < 100000) deep += ".a";
