@@ -12,7 +12,8 @@ TOOLS = {
     'PATH="$ROBOT/bin:$PATH"; export PATH; exec sh -c "$*"',
 }
 ROBOT = {
-    "dpkg": 'case "$*" in *--configure*) rm -f "$ROBOT/interrupted" ;; *) echo ${ARCHITECTURE:-armhf} ;; esac',
+    "dpkg": 'case "$*" in *--configure*) rm -f "$ROBOT/interrupted" ;;\n'
+    "*) echo ${ARCHITECTURE:-armhf} ;; esac",
     "id": "echo 0",
     "env": "shift; exec $*",
     "apt-get": 'for last; do :; done; [ ! -e "$ROBOT/interrupted" ] || exit 100\n'
