@@ -78,22 +78,25 @@ class Campaign:
         self.limits: dict[Stage, float] = {}
         self.codes: dict[Path, str] = {}
 
-    def unchanged(self, worker: Worker, stages: list[Stage], file: Path, text: str):
-        """Time limits of the stages, and the object code of the file."""
+    def limit(self, worker: Worker, stage: Stage) -> float:
+        """Asked for when a mutant gets as far as that stage, which few do."""
+        with self.lock:
+            if stage not in self.limits:
+                self.limits[stage] = worker.limit(stage)
+        return self.limits[stage]
+
+    def unchanged_code(self, worker: Worker, file: Path, text: str) -> str:
         with self.lock:
             if file not in self.codes:
                 self.codes[file] = worker.unchanged_code(file, text)
-            for stage in stages:
-                if stage not in self.limits:
-                    self.limits[stage] = worker.limit(stage, file, text)
-        return self.limits, self.codes[file]
+        return self.codes[file]
 
     def judge(self, room: Room, tests: str, file: Path, text: str, mutant: Mutant) -> Outcome:
         worker = self.workers.get()
         try:
             stages = [stage for stage in room.stages if stage.is_for(str(file))]
-            limits, same = self.unchanged(worker, stages, file, text)
-            outcome = worker.judge(stages, file, text, mutant, limits, same)
+            same = self.unchanged_code(worker, file, text)
+            outcome = worker.judge(stages, file, text, mutant, self.limit, same)
         finally:
             self.workers.put(worker)
         self.store.add(key_of(file, mutant.of(text)), tests, file, mutant, outcome)

@@ -11,6 +11,7 @@ import shlex
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from functools import cache
@@ -225,7 +226,7 @@ class Worker:
         file: Path,
         text: str,
         mutant: Mutant,
-        limits: dict[Stage, float],
+        limit: Callable[[Worker, Stage], float],
         same: str,
     ) -> Outcome:
         self.clean()
@@ -238,13 +239,14 @@ class Worker:
             if code_of(changed) == same:
                 return Outcome("same_code")
         for stage in stages:
+            limit_s = limit(self, stage)
             binary = self.prepare(stage, file, mutated, changed)
             if binary is None:
                 return Outcome("not_compiled")
             try:
-                if self.test(stage, binary, limits[stage]):
+                if self.test(stage, binary, limit_s):
                     continue
-                if stage.twice and self.test(stage, binary, limits[stage]):
+                if stage.twice and self.test(stage, binary, limit_s):
                     continue
             except Timeout:
                 return Outcome("timeout", stage.binary)
@@ -261,18 +263,17 @@ class Worker:
             raise RuntimeError(f"{file} does not compile without a change")
         return code_of(made)
 
-    def limit(self, stage: Stage, file: Path, text: str) -> float:
-        """The time that the tests of a stage may take; without a change they pass."""
-        self.clean()
-        compiled = self.compile(file, text) if file.suffix in (".c", ".cpp") else None
-        binary = self.prepare(stage, file, text, compiled)
-        if binary is None:
-            raise RuntimeError(f"{file}, {stage.binary}: does not build without a change")
+    def limit(self, stage: Stage) -> float:
+        """The time that the tests of a stage may take; as the build has them they pass."""
+        linked, own = self.tests_of(stage)
+        binary = self.folder / Path(stage.binary).name
+        if not self.join(stage.binary, linked, own, binary):
+            raise RuntimeError(f"{stage.binary}: does not build without a change")
         for _ in range(3 if stage.twice else 1):
             began = time.monotonic()
             if self.test(stage, binary, 600.0):
                 return 10.0 + 10.0 * (time.monotonic() - began)
-        raise RuntimeError(f"{file}, {stage.binary}: fails without a change")
+        raise RuntimeError(f"{stage.binary}: fails without a change")
 
 
 def code_of(made: Path) -> str:
