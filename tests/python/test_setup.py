@@ -59,7 +59,8 @@ def machine(tmp_path, root):
             if name not in without:
                 (programs / name).write_text(f"#!/bin/sh\n{body}\n")
                 (programs / name).chmod(0o755)
-        for name in "awk bash cat dirname env grep mkdir mv nproc rm sh tee touch".split():
+        tools = ("awk", "bash", "cat", "dirname", "env", "grep", "mkdir", "nproc", "rm", "sh", "tee", "touch")
+        for name in (*tools, "mv"):
             (programs / name).unlink(missing_ok=True)
             (programs / name).symlink_to(
                 next(p for p in (f"/usr/bin/{name}", f"/bin/{name}") if os.path.exists(p))
