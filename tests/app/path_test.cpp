@@ -191,6 +191,8 @@ TEST(WaypointPath, WhatTheRobotJustDoesIsAllowed) {
   EXPECT_EQ(refusal(fast, {1.50001, 5.9701, 10.0}), "");
   EXPECT_NE(refusal(fast, {1.4999, 5.9701, 10.0}).find("asks for 1.5 m/s at"), std::string::npos);
   EXPECT_NE(refusal(fast, {1.50001, 5.9699, 10.0}).find("asks for 5.97 m/s^2 at 0.005 s"), std::string::npos);
+  const std::string told = refusal(fast, {1.23456, 5.9701, 10.0});
+  EXPECT_EQ(told.substr(told.find(';')), "; the robot does 1.23") << "three digits";
   EXPECT_EQ(refusal("waltz", {2.0, 7.0, kPi}), "") << "half a turn per second";
   EXPECT_NE(refusal("waltz", {2.0, 7.0, 3.14}).find("rad/s of yaw"), std::string::npos);
   PathLimits nose{2.0, 7.0, 0.33};

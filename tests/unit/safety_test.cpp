@@ -203,6 +203,22 @@ TEST(Safety, RefusesToArmAndSaysWhy) {
   }
 }
 
+TEST(Safety, ItsLimitsThemselvesAreAllowed) {
+  const SafetyParams p = params();
+  SafetyInputs in = well();
+  in.state.theta_rad.x() = p.max_arm_tilt_rad;
+  in.state.omega_B_rad_s.z() = p.max_arm_rate_rad_s;
+  in.command_age_s = p.command_timeout_s;
+  in.tilt_sigma_rad = p.max_tilt_sigma_rad;
+  in.bias_drift_rad_s = p.max_bias_drift_rad_s;
+  in.disturbance = p.max_disturbance;
+  in.battery_V = p.min_battery_V;
+  in.wheel_rate_rad_s[1] = p.max_wheel_rate_rad_s;
+  in.slip_rad_s = p.max_slip_rad_s;
+  Safety safety(p);
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(safety.gate(half(), in).enable) << safety.reasons();
+}
+
 TEST(Safety, OneMissedSampleIsTolerated) {
   Safety safety(params());
   SafetyInputs missed = well();

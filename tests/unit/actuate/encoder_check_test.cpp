@@ -157,6 +157,9 @@ TEST(EncoderCheck, AWheelDrivenAsHardIsJudgedBeforeItsTurn) {
   };
   EXPECT_EQ(faults_after_one_window(0.6), 4U);
   EXPECT_EQ(faults_after_one_window(0.15), 0U);  // too little to say
+  // Numpy: of duties of 1 the travel less its cubic has squares whose sum has the root 5.326.
+  EXPECT_EQ(faults_after_one_window(0.97 * 7.0 * 0.3 / 5.326), 0U);
+  EXPECT_EQ(faults_after_one_window(1.03 * 7.0 * 0.3 / 5.326), 4U);
 }
 
 TEST(EncoderCheck, DisarmingForgetsAndArmingShakesAnew) {

@@ -81,6 +81,7 @@ TEST(Margins, WhatIsSlowDoesNotCount) {
   const auto integrator = [](double w) { return 10.0 / (kJ * w); };
   EXPECT_NEAR(of(integrator, 0.0, 9.0).phase_deg, 90.0, 0.01);
   EXPECT_TRUE(std::isinf(of(integrator, 0.0, 11.0).phase_deg));
+  EXPECT_EQ(margins({2.0}, {0.5}, 0.0, 2.0).disk, 6.0) << "what is as fast as that does";
 }
 
 TEST(Margins, AroundACentreCountTheDelayFromTheWholeFrequency) {
