@@ -210,6 +210,16 @@ def test_the_robots_package_is_for_its_processor(root, tmp_path):
 
 
 @pytest.mark.cross
+def test_the_package_for_64_bit_boards_runs_there(root, tmp_path):
+    package, fields = packed(root, tmp_path, "--preset", "arm64")
+    assert package.endswith("_arm64.deb") and "\nArchitecture: arm64\n" in fields
+    program = tmp_path / "tree/usr/bin/equipoise"
+    emulator = ["qemu-aarch64", "-L", root / "build/sysroot-arm64"]
+    ended = subprocess.run([*emulator, program, "--version"], capture_output=True, text=True)
+    assert ended.stdout.strip() in package, ended.stderr
+
+
+@pytest.mark.cross
 def test_every_library_of_the_robots_package_comes_from_a_package_it_depends_on(root, tmp_path):
     _, fields = packed(root, tmp_path, "--preset", "bbb", "--no-lint")
     depends = set(

@@ -109,3 +109,20 @@ def test_the_hosted_workflow_runs_the_commands_of_the_readme(root):
     assert run == ["./tools/run", "./tools/test"]
     assert all(f"{command}" in (root / "README.md").read_text() for command in run)
     assert any(step.get("run", "").startswith("./tools/release") for step in jobs["release"]["steps"])
+
+
+def test_the_packages_of_boards_find_what_tools_sysroot_made(clone):
+    """Libraries, and the packages they came in, which name what the robot's package depends on."""
+    for name, text in {
+        "tools/sysroot": 'mkdir -p "$(dirname "$0")/../build/"{sysroot,apt/bookworm-armhf}\n',
+        "tools/package": 'ls -d "$(dirname "$0")/../build/"{sysroot,apt/bookworm-armhf} >&2\nfalse\n',
+        ".gitignore": "build/\n",
+    }.items():
+        (clone / name).write_text(f"#!/bin/bash\n{text}")
+        (clone / name).chmod(0o755)
+    environment = {**os.environ, "GIT_CONFIG_GLOBAL": os.devnull}
+    for command in (["add", "-A"], ["-c", "user.name=x", "-c", "user.email=x", "commit", "-qm", "y"]):
+        subprocess.run(["git", *command], cwd=clone, check=True, env=environment)
+    ended = release(clone, "--preset", "bbb")
+    assert "tools/package --preset bbb failed" in ended.stderr
+    assert "No such file" not in ended.stderr, ended.stderr

@@ -1,13 +1,15 @@
 # Sourced after setup.sh and foreign_apt.sh: a package in a Debian that has nothing else; the program built by another release.
 # shellcheck shell=bash disable=SC2154,SC2016
 
-# run_foreign_programs: lets this machine's kernel start armhf programs.
+# run_foreign_programs ARCHITECTURE: lets this machine's kernel start its programs.
 run_foreign_programs() {
-  [ ! -e /proc/sys/fs/binfmt_misc/qemu-arm ] || return 0
+  local emulator=qemu-arm
+  [ "$1" != arm64 ] || emulator=qemu-aarch64
+  [ ! -e "/proc/sys/fs/binfmt_misc/$emulator" ] || return 0
   [ -e /proc/sys/fs/binfmt_misc/status ] || as_root mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc >&2 || true
-  as_root update-binfmts --enable qemu-arm >&2 || true
-  [ -e /proc/sys/fs/binfmt_misc/qemu-arm ] ||
-    die "this machine's kernel does not run armhf programs: no /proc/sys/fs/binfmt_misc/qemu-arm"
+  as_root update-binfmts --enable "$emulator" >&2 || true
+  [ -e "/proc/sys/fs/binfmt_misc/$emulator" ] ||
+    die "this machine's kernel does not run $1 programs: no /proc/sys/fs/binfmt_misc/$emulator"
 }
 
 # check_in_clean_debian SUITE ARCHITECTURE PACKAGE: it installs with what it depends on and nothing else, loads i2c-dev at
@@ -16,7 +18,7 @@ check_in_clean_debian() {
   local mirror file
   mirror=$(machine_mirror)
   file=$(basename "$3")
-  [ "$2" = "$(dpkg --print-architecture)" ] || run_foreign_programs
+  [ "$2" = "$(dpkg --print-architecture)" ] || run_foreign_programs "$2"
   say "Installing $file in a clean $1 $2"
   as_root mmdebstrap --mode=root --quiet --variant=minbase --architectures="$2" \
     --customize-hook="cp '$3' \"\$1/tmp/\"" \

@@ -1,16 +1,16 @@
 # Sourced by tools/package: a dpkg database of the target's libraries, for dpkg-shlibdeps in a cross build.
 # shellcheck shell=bash disable=SC2154
 
-# target_dpkg SUITE SYSROOT DATABASE: from the packages that tools/sysroot unpacked into SYSROOT; their files are listed
+# target_dpkg SUITE ARCHITECTURE SYSROOT DATABASE: from the packages that tools/sysroot unpacked into SYSROOT; their files are listed
 # where they are now.
 target_dpkg() {
-  local suite=$1 sysroot=$2 database=$3 deb name architecture entry info
-  local archives=("$root/build/apt/$suite"-armhf/cache/archives/*.deb)
+  local suite=$1 target=$2 sysroot=$3 database=$4 deb name architecture entry info
+  local archives=("$root/build/apt/$suite-$target"/cache/archives/*.deb)
   [ -e "${archives[0]}" ] || die "the packages of $sysroot are gone; run tools/sysroot again after rm -r $sysroot"
   rm -rf "$database"
   mkdir -p "$database/info" "$database/updates"
   echo 1 >"$database/info/format"
-  echo armhf >"$database/arch"
+  echo "$target" >"$database/arch"
   info=$(mktemp -d)
   for deb in "${archives[@]}"; do
     name=$(dpkg-deb --field "$deb" Package)
