@@ -262,13 +262,20 @@ ROOMS: dict[str, Room] = {
     ),
     "app": Room(
         tuple(f"src/app/{name}.cpp" for name in APP_TESTS),
-        tuple(
+        (
+            *(
+                Stage(
+                    "tests/unit_tests" if test.startswith("unit/") else "tests/app_tests",
+                    (f"{test}_test.cpp",),
+                    only=(f"src/app/{name}.cpp",),
+                )
+                for name, test in APP_TESTS.items()
+            ),
             Stage(
-                "tests/unit_tests" if test.startswith("unit/") else "tests/app_tests",
-                (f"{test}_test.cpp",),
-                only=(f"src/app/{name}.cpp",),
-            )
-            for name, test in APP_TESTS.items()
+                "tests/drivers/doctor_tests",
+                ("drivers/status_lights_test.cpp", *DRIVER_FIXTURES),
+                only=("src/app/run/status_indicator.cpp",),
+            ),
         ),
         target=0.9,
     ),
