@@ -28,8 +28,8 @@ class Engine:
         self.pushed = self.data.xfrc_applied[self.body][:2]
         self.accelerometer = self.data.sensor("accel").data
         self.has_ball = self.model.nq == 11
-        ball = self.model.body("ball").id if self.has_ball else self.body
-        self.dragged = self.data.xfrc_applied[ball][:2]
+        rolling = [self.model.body(name).id for name in (["ball"] if self.has_ball else ["right", "left"])]
+        self.dragged = [self.data.xfrc_applied[body][:2] for body in rolling]
         self.back = np.zeros(4)
 
     def start(self) -> None:
@@ -52,11 +52,9 @@ class Engine:
             lib.mju_rotVecQuat(data.qfrc_applied[6:9], self.torque, self.back)
         else:
             data.qfrc_applied[6:8] = self.torque[:2]
-        self.dragged[:] = self.drag
-        if self.has_ball:
-            self.pushed[:] = self.push
-        else:
-            self.pushed[:] += self.push
+        self.pushed[:] = self.push
+        for force in self.dragged:
+            force[:] = self.drag / len(self.dragged)
         lib.mj_step(self.model, data)
         self.read()
 

@@ -95,6 +95,20 @@ def test_the_wheeled_robot_answers_tilt_and_torque_as_the_exact_model(root, tmp_
         assert engine.gyro[2] / (n * h) == pytest.approx(qdd[2], rel=0.05, abs=0.05)
 
 
+@pytest.mark.parametrize("robot", models.ROBOTS)
+def test_a_drag_asks_for_the_lean_of_its_moment_about_the_floor(robot):
+    """At the body's centre of mass it would ask for (r + l) / r of that."""
+    engine, inputs, d = engine_of(robot)
+    tilt, touching = 0.02, (1 if robot == "mbbr" else 2)
+    moment = d["body_mass_kg"] * models.G * d["com_height_m"] * np.sin(tilt)
+    inputs[:touching], inputs[6] = moment / touching, moment / models.rolling_radius_m(robot, d)
+    tilted(engine, tilt)
+    for _ in range(20):
+        engine.step()
+    assert np.abs(engine.gyro).max() < 1e-3
+    assert np.abs(engine.joint_rate).max() < 1e-2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("config", "yaw_hz", "drive_mps"),
