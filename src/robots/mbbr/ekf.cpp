@@ -10,10 +10,6 @@ using Observable = MbbrObservable;
 
 template class PackedFilter<MbbrEkfModel, generated::MbbrFilter>;
 
-/// Standard deviations of a wheel's innovation that are no slip: NIS of real logs reaches 4, and a bias of
-/// the gyro that drifts has to show in the wheels.
-static constexpr double kSlips = 2.0;
-
 MbbrEkfModel::MbbrEkfModel(const MbbrParameters& p, double disturbance_time_constant_s)
     : c_(mbbr_coefficients(p)),
       wheels_from_ball_(p.r / p.r_w * MbbrKinematics(p).T_ob().transpose()),
@@ -226,7 +222,7 @@ void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
       imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], wheel[2], imu, imu};
   filter_.innovate(time_.acted(), y, use);
   const auto counts = [this](const Vec3& wheels) { return kinematics_.ball_from_wheels(wheels); };
-  if (encoders_slip_ && widen_by_slip<3>(filter_, Model::kWheel, Model::kE, kSlips, counts))
+  if (encoders_slip_ && widen_by_slip<3>(filter_, Model::kWheel, Model::kE, counts))
     filter_.weigh_again(time_.acted(), y, use);
 }
 

@@ -14,7 +14,6 @@ namespace {
 constexpr double kPushNis = 30.0;
 constexpr double kPushTiltRateVariance = 0.005;
 constexpr double kPushWheelRateVariance = 0.1;
-constexpr double kSlips = 1.0;  // standard deviations of a wheel's innovation: the gyro alone tells the tilt
 constexpr int kSettling = 100;  // ticks after arming: the robot shakes by itself until it knows its mount
 // A robot on two wheels turns about y only as it leans in a turn: a y that is five sigma off lies, or a wheel
 // rolls over something. Either way it says nothing about the tilt for a while.
@@ -281,7 +280,7 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
   const auto counts = [this](const Vec2& wheels) {
     return Vec2(kinematics_.phi(wheels), kinematics_.psi(wheels));
   };
-  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, kSlips, counts))
+  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, counts))
     filter_.weigh_again(time_.acted(), y, use);
 }
 
