@@ -181,8 +181,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   SafetyInputs checks(const Result& t, const Command& asked, std::uint32_t inhibit) const noexcept {
     SafetyInputs in = safety_inputs(t.z, view(t.x_hat, p_.robot), encoder_check_, asked);
-    if (health_.while_arming)
-      (health_.stood_still ? in.encoders_stuck : in.encoders_reversed) |= health_.lost;
+    in.encoders_reversed |= health_.backwards;
     in.encoders_stuck |= health_.dead;
     if (encoder_probe_.dead()) in.encoders_stuck |= (1U << Robot::kWheels) - 1U;
     in.encoders_in_check = in.encoders_in_check || health_.checking;

@@ -46,7 +46,6 @@ class Evidence {
   void reset(double sigma_rad_s) noexcept {
     const double sigma = std::min(sigma_rad_s, kMostVibration_rad_s);
     vibration_ = sigma * sigma;
-    still_.fill(0);
     forget();
   }
   /// The samples before the next are not known.
@@ -120,8 +119,6 @@ class Evidence {
   }
   /// The tick is over.
   void hear(const Sample& z) noexcept {
-    for (std::size_t i = 0; i < still_.size(); ++i)
-      still_[i] = known_ && repeats(kWheelRow + i, z) ? still_[i] + 1 : 0;
     before_ = z;
     known_ = z.encoders_ok;
   }
@@ -132,8 +129,6 @@ class Evidence {
   double least_jump_rad_s() const noexcept { return std::max(kLeastJump_rad_s, 3.0 * vibration_rad_s()); }
   bool known() const noexcept { return known_; }
   const Sample& before() const noexcept { return before_; }
-  /// Ticks since an encoder has counted.
-  int still(std::size_t wheel) const noexcept { return still_[wheel]; }
 
   /// Variance of an innovation: what the filter expects, at least what vibrates, and the model's error.
   double spread(const Filter& f, std::size_t row) const noexcept {
@@ -295,7 +290,6 @@ class Evidence {
   std::array<double, kRows> shaken_{};  // of a sample of the IMU that is shaken
   Sample before_;                       // a tick ago
   bool known_ = false;
-  std::array<int, static_cast<std::size_t>(Wheels)> still_{};
 };
 
 }  // namespace equipoise

@@ -13,8 +13,7 @@ template <int Wheels>
 struct EstimatorHealth {
   double tilt_sigma_rad = 0.0;    // 0: not known
   std::uint32_t lost = 0;         // bit per wheel whose encoder is not used any more
-  bool stood_still = false;       // when it was found out
-  bool while_arming = false;      // found so early that the robot had better not run without it
+  std::uint32_t backwards = 0;    // those that were found so early that they are wired backwards
   bool checking = false;          // just armed: the encoders are on trial
   std::uint32_t dead = 0;         // bits of encoders that stand still together while the robot moves
   double bias_drift_rad_s = 0.0;  // of the gyro, lately
@@ -34,8 +33,7 @@ void report(const Faults& faults, EstimatorHealth<Wheels>* health) noexcept {
   const std::uint32_t wheels = faults.excluded_wheels();
   health->lost = wheels;
   health->dead = (wheels & (wheels - 1)) != 0 ? wheels : 0;
-  health->stood_still = faults.stood_still();
-  health->while_arming = faults.while_arming();
+  health->backwards = faults.wired_backwards();
   health->checking = faults.suspects();
   health->gyro_left_out = faults.gyro_axis_excluded();
   health->gyro_bias_jumped = faults.bias_jumps() > 0;

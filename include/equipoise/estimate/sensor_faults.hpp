@@ -97,9 +97,10 @@ class SensorFaults {
   int bias_jumps() const noexcept { return jumps_; }
   /// A fault leads: what surprises the control's filter is about to be explained.
   bool suspects() const noexcept { return suspects_; }
-  /// An encoder was found so early that it has been faulty from the start, or the robot is put down badly.
-  bool while_arming() const noexcept { return used_.without_wheels != 0 && excluded_at_ <= kArmingTicks; }
-  bool stood_still() const noexcept { return stood_still_; }
+  /// Encoders that were found so early that they are wired so.
+  std::uint32_t wired_backwards() const noexcept {
+    return mirrored_at_ <= kArmingTicks ? used_.backwards : 0U;
+  }
   /// Filters that ran in this tick.
   int ran() const noexcept { return ran_; }
   double ratio(std::size_t hypothesis) const noexcept { return members_[hypothesis].ratio; }
@@ -123,7 +124,6 @@ class SensorFaults {
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
   static constexpr int kRocking = 400;      // no body rocks for longer
-  static constexpr int kStillTicks = 4;     // of an encoder that stands
   // Events and faults.
   static constexpr double kJump_rad_s = 0.3;
   static constexpr double kBias_rad_s = 0.1;  // uncertain after a jump: the noise of one sample
@@ -362,15 +362,13 @@ class SensorFaults {
   void use(std::size_t hypothesis) noexcept {
     const FaultHypothesis& h = kHypotheses[hypothesis];
     Member& m = members_[hypothesis];
-    const bool reversed = h.kind == FaultHypothesis::kReversed;
-    const std::uint32_t without = reversed ? used_.without_wheels | h.mask : m.used.without_wheels;
-    if ((without & ~used_.without_wheels) != 0) {
-      excluded_at_ = ticks_;
-      stood_still_ = !reversed && weigh_.still(static_cast<std::size_t>(h.first())) >= kStillTicks;
+    if (h.kind == FaultHypothesis::kReversed) {
+      used_.backwards |= h.mask;
+      used_.without_wheels |= h.mask;
+      mirrored_at_ = ticks_;
+    } else {
+      used_ = m.used;
     }
-    if (!reversed) used_ = m.used;
-    if (reversed) used_.backwards |= h.mask;
-    used_.without_wheels = without;
     healthy_.adopt(m.settled());
     if (h.kind == FaultHypothesis::kBias) ++jumps_;
     if (h.kind == FaultHypothesis::kAxis && h.mask == kAhead) rocks_at_ = ticks_;
@@ -391,9 +389,9 @@ class SensorFaults {
   FaultEvidence evidence_;
   std::array<double, 3> quiet_{};  // the gyro's variances
   bool stale_ = true;              // members have missed a tick
-  bool trusted_ = true, suspects_ = false, goes_on_ = false, stood_still_ = false;
+  bool trusted_ = true, suspects_ = false, goes_on_ = false;
   int ticks_ = 0, jumps_ = 0, ran_ = 1;  // since arming; filters in this tick
-  int excluded_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
+  int mirrored_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
   std::size_t leader_ = 0;
 };
 

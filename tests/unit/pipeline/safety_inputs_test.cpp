@@ -26,16 +26,12 @@ std::uint32_t reasons_with(const Health& health, int ticks = 1) {
   return b.steps(ticks).reasons;
 }
 
-TEST(Pipeline, WhatTheEstimatorFindsOutWhileArmingStopsTheMotors) {
+TEST(Pipeline, WhatTheEstimatorFindsOutWhileArming) {
   Health health;
   health.lost = 2;
-  EXPECT_EQ(reasons_with(health), 0U) << "later the robot runs on without";
-  health.while_arming = true;
+  EXPECT_EQ(reasons_with(health), 0U) << "the robot runs on without";
+  health.backwards = 2;
   EXPECT_EQ(reasons_with(health), std::uint32_t{kEncoderSign | kWheelTwo});
-  health.stood_still = true;
-  EXPECT_EQ(reasons_with(health), std::uint32_t{kEncoderStuck | kWheelTwo});
-  health.dead = 1;
-  EXPECT_EQ(reasons_with(health), std::uint32_t{kEncoderStuck | kWheelOne | kWheelTwo});
   health = {};
   health.dead = 3;
   EXPECT_EQ(reasons_with(health), std::uint32_t{kEncoderStuck | kWheelOne | kWheelTwo});
