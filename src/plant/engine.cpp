@@ -27,6 +27,7 @@ EngineBody::EngineBody(const Calibration& calibration, const WorldParams& world,
       weight_N_(weight_N),
       engine_(engine),
       start_noise_(world.seed, kStartNoise),
+      loop_noise_(world.seed, kLoop),
       motion_(started(engine, start_attitude(start_noise_, world.initial_tilt_rad))),
       yaw_rad_(euler_angles(motion_.R_WB).z()),
       sensors_(calibration, world, wheels, start_noise_, euler_angles(motion_.R_WB)) {}

@@ -159,6 +159,20 @@ def test_nothing_pushes_on_a_calm_floor(root):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("config", ["mbbr", "edumip"])
+def test_friction_that_grows_and_missed_ticks_reach_mujoco_too(root, config):
+    trial = {"robot": 0, "seed": 1, "yaw_hz": 0.0, "drive_mps": 0.2, "duration_s": 5.0, "floor": "calm"}
+    trial["fidelity"] = "nominal"
+    world = "world.nominal.disturbance."
+    changes = [[], ["friction_scale=[1.5, 1.5]"], ["missed_tick_share=0.05"]]
+    rows = [
+        mujoco_engine.run(trial, str(root / f"config/{config}.toml"), [world + text for text in change])
+        for change in changes
+    ]
+    assert len({row["attitude_rmse_rad"] for row in rows}) == 3
+
+
+@pytest.mark.slow
 def test_a_twin_shows_what_detection_did(root):
     trial = {"robot": 3, "seed": 3, "yaw_hz": 1.0, "drive_mps": 0.2, "duration_s": 6.0, "floor": "disturbed"}
     trial["fidelity"] = "built2025"

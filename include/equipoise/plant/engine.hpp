@@ -37,19 +37,13 @@ class EngineBody {
   EngineBody(const Calibration& calibration, const WorldParams& world, int wheels, double weight_N,
              Engine& engine);
 
-  /// Advances one tick; `step()` takes one step of the engine by `drive()`. The bridges take the command at
-  /// the nearest step.
+  /// Advances one tick, or two where the loop misses one; `step()` takes one step of the engine by `drive()`.
+  /// The bridges take the command at the nearest step.
   template <class Motors, class Step>
   void advance(const MotorCommand& command, Motors& motors, Step&& step) {
-    if (command.enable) held_ = false;
-    const auto steps = static_cast<int>(std::lround(kTickS / world_.step_s));
-    const auto taken_at = static_cast<int>(std::lround(world_.actuation_steps()));
-    for (int i = 0; i < steps && !held_; ++i) {
-      if (i == taken_at) motors.command(command);
-      step();
-      time_s_ += world_.step_s;
-    }
-    if (held_) time_s_ += kTickS;
+    advance_tick(command, motors, step);
+    const double missed = world_.missed_tick_share;
+    if (missed > 0.0 && loop_noise_.uniform(0.0, 1.0) < missed) advance_tick(command, motors, step);
   }
   /// `wheel_angle_rad`: as the encoders have it before the step.
   void drive(const Vec3& joint_torque_N_m, const Vec<kMaxMotors>& wheel_angle_rad);
@@ -62,10 +56,23 @@ class EngineBody {
   double time_s() const noexcept { return time_s_; }
 
  private:
+  template <class Motors, class Step>
+  void advance_tick(const MotorCommand& command, Motors& motors, Step&& step) {
+    if (command.enable) held_ = false;
+    const auto steps = static_cast<int>(std::lround(kTickS / world_.step_s));
+    const auto taken_at = static_cast<int>(std::lround(world_.actuation_steps()));
+    for (int i = 0; i < steps && !held_; ++i) {
+      if (i == taken_at) motors.command(command);
+      step();
+      time_s_ += world_.step_s;
+    }
+    if (held_) time_s_ += kTickS;
+  }
+
   WorldParams world_;
   double weight_N_;
   Engine& engine_;
-  NoiseStream start_noise_;
+  NoiseStream start_noise_, loop_noise_;
   EngineMotion motion_;
   double turns_rad_ = 0.0;  // whole turns of the heading
   double yaw_rad_ = 0.0;

@@ -29,7 +29,7 @@ void MipEngineWorld::step() {
     if (!gears_[static_cast<std::size_t>(i)].step(d.gear, crossing(i), h)) torque(i) = 0.0;
   }
   if (world_.common.friction) {
-    Vec2 limit = robot_.mu_c * d.friction_gain;
+    Vec2 limit = world_.common.friction_now(body_.time_s()) * (robot_.mu_c * d.friction_gain);
     for (int i = 0; i < 2; ++i) limit(i) *= world_.common.stiction.factor(rate(i));
     const Vec2 free = rate + h * (others_rad_s2_ + mobility_ * torque);
     torque += coulomb_torque(free, mobility_, h, limit);
