@@ -97,15 +97,23 @@ def test_intervals_from_a_real_ball_bot_hold_on_its_next_24_s(root):
 
 
 @pytest.mark.parametrize(
-    ("table", "settings", "complaint"),
+    ("table", "change", "complaint"),
     [
-        ("", 'robot = "ROOT/config/real/rob311.toml"\n[time]\ncolumn = "t"\n', "holds no row"),
-        ("t\n1\n", "", "has no 'robot'"),
+        ("", ("", ""), "no row of numbers"),
+        ("t,x,y\n1,2,3\n", ('robot = "', 'name = "'), "robot: missing"),
+        ("t,x,y\n1,2,3\n2,2,3\n", ('["x"]', '["x", "y"]'), "tilt.axes of the map names 2 columns"),
+        ("t,x,y\n1,2,3\n2,2,3\n", ('["x"]', '["z"]'), 'no column "z"'),
     ],
 )
-def test_what_is_no_table_and_no_map_is_said_in_a_line(root, tmp_path, table, settings, complaint):
+def test_what_is_no_table_and_no_map_is_said_in_a_line(root, tmp_path, table, change, complaint):
+    wheels = 'axes = ["x", "y"]\n'
+    settings = f'robot = "{root}/config/edumip.toml"\n[time]\ncolumn = "t"\nunit = "s"\n'
+    settings += '[tilt]\naxes = ["x"]\nunit = "rad"\n[battery]\nvolts = 7.4\n'
+    settings += (
+        f'[wheels]\nkind = "angle"\nunit = "rad"\n{wheels}[drive]\nkind = "volts"\nunit = "V"\n{wheels}'
+    )
     (tmp_path / "t.csv").write_text(table)
-    (tmp_path / "m.toml").write_text(settings.replace("ROOT", str(root)) + "[tilt]\n[wheels]\n[drive]\n")
+    (tmp_path / "m.toml").write_text(settings.replace(*change))
     command = [sys.executable, "-m", "equipoise_tools.identify_balancing", tmp_path / "t.csv"]
     command += ["--map", tmp_path / "m.toml"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)

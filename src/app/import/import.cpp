@@ -208,6 +208,10 @@ ImportedRobot imported_robot(const std::string& path) {
 
 ImportedRows imported_rows(const Table& table, const ImportMap& map, const ImportedRobot& robot) {
   const auto wheels = static_cast<std::size_t>(robot.wheels);
+  const std::size_t balances_about = wheels == 2 ? 1 : 2;
+  if (map.tilt.axes.size() > balances_about)
+    throw InputError(format("tilt.axes of the map names %zu columns; a robot of type %s balances about %zu",
+                            map.tilt.axes.size(), robot.run.robot.c_str(), balances_about));
   for (const auto& [key, channel] : {std::pair{"wheels", &map.wheels}, std::pair{"drive", &map.drive}}) {
     if (channel->axes.size() == wheels) continue;
     throw InputError(std::string(key) + ".axes of the map names " + std::to_string(channel->axes.size()) +
@@ -230,22 +234,20 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
   rows.wheel_rad.assign(n, {});
   rows.drive.assign(n, {});
   rows.battery_V.assign(n, map.battery_V);
-  rows.tilt_rad.assign(n, kNotGiven);
-  const auto pick = [&](const SignedColumn& column, std::vector<double>* to) {
-    if (column.name.empty()) return;
-    const std::vector<double> all = columns(column);
-    for (std::size_t k = 0; k < n; ++k) (*to)[k] = all[used[k]];
-  };
-  pick(map.battery, &rows.battery_V);
-  pick(map.tilt, &rows.tilt_rad);
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::vector<double> gyro = channel_column(columns, map.gyro, i, rows.t_s, used);
-    const std::vector<double> accel = channel_column(columns, map.accel, i, rows.t_s, used);
-    for (std::size_t k = 0; k < n; ++k) {
-      rows.gyro_rad_s[k](static_cast<int>(i)) = gyro[k];
-      rows.accel_m_s2[k](static_cast<int>(i)) = accel[k];
-    }
+  rows.tilt_rad.assign(n, Vec2::Constant(kNotGiven));
+  if (!map.battery.name.empty()) {
+    const std::vector<double> all = columns(map.battery);
+    for (std::size_t k = 0; k < n; ++k) rows.battery_V[k] = all[used[k]];
   }
+  const auto pick = [&](const Channel& channel, auto* to) {
+    for (std::size_t i = 0; i < channel.axes.size(); ++i) {
+      const std::vector<double> axis = channel_column(columns, channel, i, rows.t_s, used);
+      for (std::size_t k = 0; k < n; ++k) (*to)[k](static_cast<int>(i)) = axis[k];
+    }
+  };
+  pick(map.gyro, &rows.gyro_rad_s);
+  pick(map.accel, &rows.accel_m_s2);
+  pick(map.tilt, &rows.tilt_rad);
   for (std::size_t i = 0; i < wheels; ++i) {
     std::vector<double> wheel = channel_column(columns, map.wheels, i, rows.t_s, used);
     if (map.wheels.kind == "rate") integrate(rows.t_s, &wheel);
@@ -308,7 +310,7 @@ std::vector<runtime::TickRecord> imported_ticks(const ImportedRows& rows, const 
     r.arm = balances(map, now_s);
     r.arm_state = static_cast<std::int32_t>(r.arm ? ArmState::kArmed : ArmState::kDisarmed);
     r.motors.enable = r.arm;
-    r.estimate.theta_rad[0] = rows.tilt_rad[newest];
+    r.estimate.theta_rad[0] = rows.tilt_rad[newest].x();
     r.battery_V = rows.battery_V[newest];
     r.motor_count = robot.wheels;
     WheelValues u{};

@@ -38,8 +38,9 @@ struct ImportedRows {
   std::vector<double> t_s;
   std::vector<Vec3> gyro_rad_s, accel_m_s2;   // accelerometer: specific force
   std::vector<WheelValues> wheel_rad, drive;  // drive: voltage, share of nominal
-  std::vector<double> battery_V, tilt_rad;    // tilt: NaN where the table has none
-  std::size_t not_advancing = 0;              // rows left out: their time is not after the last
+  std::vector<double> battery_V;
+  std::vector<Vec2> tilt_rad;     // NaN where the table has none
+  std::size_t not_advancing = 0;  // rows left out: their time is not after the last
 };
 
 ImportedRows imported_rows(const Table& table, const ImportMap& map, const ImportedRobot& robot);

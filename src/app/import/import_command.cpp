@@ -11,7 +11,7 @@ namespace equipoise::app {
 namespace {
 
 struct ImportArguments {
-  std::string table, map, log, json;
+  std::string table, map, log, json, motion;
 };
 
 void write_log(const std::string& path, const std::vector<runtime::TickRecord>& ticks,
@@ -64,7 +64,32 @@ nlohmann::json to_json(const ImportArguments& a, const ImportMap& map, const Imp
           {"version", version()}};
 }
 
+/// Each row's tilt, rolling and drive about the axes that the robot balances about.
+int write_motion(const ImportArguments& a) {
+  const ImportMap map = read_motion_map(a.map);
+  const ImportedRobot robot = imported_robot(map.robot);
+  const ImportedRows rows = imported_rows(read_table(a.table, map.table), map, robot);
+  nlohmann::json axes = nlohmann::json::array();
+  for (std::size_t i = 0; i < map.tilt.axes.size(); ++i) {
+    const auto axis = static_cast<int>(i);
+    std::vector<double> tilt, rolling, drive;
+    for (std::size_t k = 0; k < rows.t_s.size(); ++k) {
+      tilt.push_back(rows.tilt_rad[k](axis));
+      rolling.push_back(robot.rolling(rows.wheel_rad[k])(axis));
+      drive.push_back(robot.input(rows.drive[k])[i]);
+    }
+    axes.push_back({{"tilt_rad", tilt}, {"rolling_rad", rolling}, {"drive", drive}});
+  }
+  nlohmann::json balancing = nlohmann::json::array();
+  for (const Stretch& s : map.balancing) balancing.push_back({s.from_s, s.to_s});
+  write_json({{"config", map.robot}, {"t_s", rows.t_s}, {"axes", axes}, {"balancing_s", balancing}},
+             a.motion);
+  return 0;
+}
+
 int import(const ImportArguments& a) {
+  if (a.motion.empty() == a.log.empty()) throw InputError("either --out or --motion");
+  if (!a.motion.empty()) return write_motion(a);
   const ImportMap map = read_import_map(a.map);
   const ImportedRobot robot = imported_robot(map.robot);
   const Table table = read_table(a.table, map.table);
@@ -99,7 +124,12 @@ void add_import(Subcommand app) {
   command.option("--map", a->map, "TOML: columns, units, axes, time, drive; docs/reality.md")
       .file()
       .required();
-  command.option("-o,--out", a->log, "LCM event log to write").file().required();
+  command.option("-o,--out", a->log, "LCM event log to write").file();
+  command
+      .option(
+          "--motion", a->motion,
+          "instead: each row's tilt, rolling and drive as JSON, - for stdout; needs no gyro or accelerometer")
+      .file();
   command.option("--json", a->json, "result as JSON, - for stdout").file();
   command.action([=] { return import(*a); });
 }

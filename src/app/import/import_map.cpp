@@ -112,9 +112,16 @@ void read_motion(Section& root, ImportMap* map) {
   battery.finish();
 }
 
-}  // namespace
+void read_tilt(Section s, ImportMap* map) {
+  if (s.has("axes")) {
+    map->tilt = read_channel(s, kAngle);
+    return;
+  }
+  map->tilt.axes = {signed_column(s.text("column"), read_scale(s, kAngle))};
+  s.finish();
+}
 
-ImportMap read_import_map(const std::string& path) {
+ImportMap read_robots_map(const std::string& path, bool imu) {
   const Document document(path, {});
   Section root(document, document.root(), "");
   ImportMap map;
@@ -127,16 +134,17 @@ ImportMap read_import_map(const std::string& path) {
       s.finish();
     }
   }
-  map.gyro = read_imu(root.table("gyro"), kRate);
-  map.accel = read_imu(root.table("accel"), kAcceleration);
-  if (root.has("tilt")) {
-    Section tilt = root.table("tilt");
-    map.tilt = signed_column(tilt.text("column"), read_scale(tilt, kAngle));
-    tilt.finish();
-  }
+  if (imu || root.has("gyro")) map.gyro = read_imu(root.table("gyro"), kRate);
+  if (imu || root.has("accel")) map.accel = read_imu(root.table("accel"), kAcceleration);
+  if (!imu || root.has("tilt")) read_tilt(root.table("tilt"), &map);
   root.finish();
   return map;
 }
+
+}  // namespace
+
+ImportMap read_import_map(const std::string& path) { return read_robots_map(path, true); }
+ImportMap read_motion_map(const std::string& path) { return read_robots_map(path, false); }
 
 ImportMap read_bench_map(const std::string& path) {
   const Document document(path, {});

@@ -51,11 +51,13 @@ struct ImportMap {
   Channel drive;
   SignedColumn battery;  // empty: battery_V
   double battery_V = kNotGiven;
-  SignedColumn tilt;  // the robot's own estimate, about body x; empty: none
-  Channel current;    // of a motor bench, in the order of its motors
+  Channel tilt;     // the robot's own estimate, about body x, of a ball-bot about y too; empty: none
+  Channel current;  // of a motor bench, in the order of its motors
 };
 
 ImportMap read_import_map(const std::string& path);
+/// Of a robot that logs its tilt in place of gyro and accelerometer.
+ImportMap read_motion_map(const std::string& path);
 /// Of a motor bench: time, wheels (the shafts), drive, current, battery; no robot.
 ImportMap read_bench_map(const std::string& path);
 
