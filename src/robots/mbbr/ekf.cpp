@@ -1,5 +1,7 @@
 #include "robots/mbbr/ekf.hpp"
 
+#include <algorithm>
+
 #include "equipoise/estimate/encoder_slip.hpp"
 #include "equipoise/estimate/heun.hpp"
 #include "equipoise/estimate/push_response.hpp"
@@ -7,6 +9,14 @@
 namespace equipoise {
 
 using Observable = MbbrObservable;
+
+/// Beyond two standard deviations (NIS of real logs reaches 4) an innovation corrects the less, the larger it
+/// is (redescending influence, Hampel 1974), or a robot whose wheels spin would follow them.
+static double slips(double nis) noexcept {
+  constexpr double kNoSlip = 4.0;
+  constexpr double kMost = 1e4;  // single precision can take it off again
+  return std::min(nis / kNoSlip * (nis / kNoSlip), kMost);
+}
 
 template class PackedFilter<MbbrEkfModel, generated::MbbrFilter>;
 
@@ -222,7 +232,7 @@ void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
       imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], wheel[2], imu, imu};
   filter_.innovate(time_.acted(), y, use);
   const auto counts = [this](const Vec3& wheels) { return kinematics_.ball_from_wheels(wheels); };
-  if (encoders_slip_ && widen_by_slip<3>(filter_, Model::kWheel, Model::kE, counts))
+  if (encoders_slip_ && widen_by_slip<3>(filter_, Model::kWheel, Model::kE, slips, counts))
     filter_.weigh_again(time_.acted(), y, use);
 }
 

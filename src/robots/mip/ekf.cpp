@@ -1,5 +1,7 @@
 #include "robots/mip/ekf.hpp"
 
+#include <cmath>
+
 #include "equipoise/estimate/encoder_slip.hpp"
 #include "equipoise/estimate/heun.hpp"
 #include "equipoise/estimate/push_response.hpp"
@@ -25,6 +27,10 @@ constexpr int kWithoutTicks = 100;
 constexpr double kMovingTiltRateVariance = 0.1 * 0.1;
 constexpr double kMovingWheelRateVariance = 0.5 * 0.5;
 constexpr double kMovingAngleVariance = 0.02 * 0.02;
+
+/// Beyond one standard deviation an innovation corrects no more than one of just that (Huber 1965): the gyro
+/// alone tells the tilt, but wheels that have left the ground are to be seen.
+double slips(double nis) noexcept { return std::sqrt(nis); }
 
 }  // namespace
 
@@ -280,7 +286,7 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
   const auto counts = [this](const Vec2& wheels) {
     return Vec2(kinematics_.phi(wheels), kinematics_.psi(wheels));
   };
-  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, counts))
+  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, slips, counts))
     filter_.weigh_again(time_.acted(), y, use);
 }
 
