@@ -348,10 +348,12 @@ class SensorFaults {
   }
 
   /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
-  /// The control's filter knows pushes and slips by itself, but of no noisier samples.
+  /// The control's filter takes a push by itself, one on three wheels a slip, too: it lets go of wheels that
+  /// slip far (encoder_slip.hpp). It knows of no noisier samples.
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].settled());
-    if (kHypotheses[event].kind == FaultHypothesis::kNoise) go_on(control);
+    if (kRocks ? !kHypotheses[event].pushes() : kHypotheses[event].kind == FaultHypothesis::kNoise)
+      go_on(control);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.depart(ratio, -kMargin);
     begin(event, healthy_);
