@@ -298,7 +298,10 @@ const std::map<std::uint32_t, std::function<std::uint32_t()>> kCauses{
     {kWriteFailed, [] { return after(app::FaultKind::kWriteError); }},
     {kLogFailed, full_disk},
     {kEncoderStuck,
-     [] { return driven_off([](RawSample& raw, std::int64_t) { raw.encoder_counts[1] = 17.0; }); }},
+     [] {
+       return driven_off(
+           [](RawSample& raw, std::int64_t) { raw.encoder_counts[0] = raw.encoder_counts[1] = 17.0; });
+     }},
     {kImuUntrusted, [] { return after(app::FaultKind::kGyroXFrozen); }},
     {kMotorFault, [] { return after(app::FaultKind::kMotorStuck); }},
     {kWheelOne, [] { return reversed_encoder(0); }},
