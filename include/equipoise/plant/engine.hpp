@@ -42,8 +42,7 @@ class EngineBody {
   template <class Motors, class Step>
   void advance(const MotorCommand& command, Motors& motors, Step&& step) {
     advance_tick(command, motors, step);
-    const double missed = world_.missed_tick_share;
-    if (missed > 0.0 && loop_noise_.uniform(0.0, 1.0) < missed) advance_tick(command, motors, step);
+    if (loop_noise_.happens(world_.missed_tick_share)) advance_tick(command, motors, step);
   }
   /// `wheel_angle_rad`: as the encoders have it before the step.
   void drive(const Vec3& joint_torque_N_m, const Vec<kMaxMotors>& wheel_angle_rad);

@@ -89,6 +89,8 @@ class NoiseStream {
   double uniform(double low, double high) {
     return low + (high - low) * std::uniform_real_distribution<double>(0.0, 1.0)(engine_);
   }
+  /// Whether an event of that share of the calls happens at this one. A share of 0 draws nothing.
+  bool happens(double share) { return share > 0.0 && uniform(0.0, 1.0) < share; }
   template <int N>
   Vec<N> gaussian_vector(double sigma) {
     Vec<N> v;

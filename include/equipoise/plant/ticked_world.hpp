@@ -23,8 +23,7 @@ class TickedWorld : public SimulatedDevices {
  public:
   void advance(const MotorCommand& command) override {
     advance_tick(command);
-    const double missed = common_.missed_tick_share;
-    if (missed > 0.0 && loop_noise_.uniform(0.0, 1.0) < missed) advance_tick(command);
+    if (loop_noise_.happens(common_.missed_tick_share)) advance_tick(command);
   }
   double time_s() const noexcept override { return time_s_; }
 
