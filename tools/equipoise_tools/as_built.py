@@ -7,11 +7,8 @@ tools/campaign, one per robot type), and the same robots with one filter and con
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +17,9 @@ from . import style
 from .campaign import read_parts
 from .campaign_page import _column, at_point, error_table, points_of, survival_table
 from .campaign_statistics import survival_over_time
-from .paths import UserError, binary, repository_root
+from .paths import UserError, repository_root
 from .style import plt
+from .trials import run_trials
 
 POINT = (1.0, 0.2)  # Hz, m/s
 DURATION_S = 60.0
@@ -35,25 +33,14 @@ STEPS = (
 LIMITS = {"attitude_rmse_rad": 0.010, "yaw_frame_speed_rmse_m_s": 0.015}  # 95 % of the robots, up to 1.5 Hz
 
 
-def trials(rows: list[dict]) -> list[dict]:
-    with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
-        request = Path(folder) / "trials.json"
-        request.write_text(json.dumps({"trials": rows}))
-        config = repository_root() / "config" / "mbbr.toml"
-        command = [binary(), "trials", "--config", config, "--in", request, "--jobs", os.cpu_count() or 1]
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise UserError(done.stderr.strip())
-    return json.loads(done.stdout)["trials"]
-
-
 def steps(robots: range) -> list[tuple[str, list[dict]]]:
     """The same robots, step by step."""
     found = []
     for name, estimator, controller in STEPS:
         common = {"seed": 1, "yaw_hz": POINT[0], "drive_mps": POINT[1], "duration_s": DURATION_S}
         choice = {"fidelity": "full", "estimator": estimator, "controller": controller}
-        found.append((name, trials([{"robot": robot, **common, **choice} for robot in robots])))
+        asked = [{"robot": robot, **common, **choice} for robot in robots]
+        found.append((name, run_trials("config/mbbr.toml", asked)))
     return found
 
 

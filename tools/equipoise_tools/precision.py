@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
 from .count_page import PAGE, PRECISION, ROBOTS, performance_page, precision_table
 from .entry import leave
 from .paths import UserError, repository_root
+from .trials import run_trials
 
 ERRORS = ("attitude_rmse_rad", "yaw_frame_speed_rmse_m_s")
 QUANTILES = (0.5, 0.95)
@@ -39,20 +37,9 @@ def trials(robots: int, first: int, fidelity: str, duration_s: float) -> list[di
     ]
 
 
-def ran(config: Path, precision: str, asked: list[dict], jobs: int) -> list[dict]:
-    program = repository_root() / "build/host/equipoise"
-    setting = f'estimator.ekf.precision="{precision}"'
-    with tempfile.TemporaryDirectory() as folder:
-        request = Path(folder) / "trials.json"
-        request.write_text(json.dumps({"trials": asked}), encoding="utf-8")
-        command = [str(program), "trials", "--config", str(config), "--in", str(request), "--json", "-"]
-        command += ["--jobs", str(jobs), "--set", setting]
-        print(f"{config.stem}, {precision}: {len(asked)} runs", file=sys.stderr, flush=True)
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise UserError(f"{' '.join(command)}: {done.stderr.strip()[-500:]}")
-    results: list[dict] = json.loads(done.stdout)["trials"]
-    return results
+def ran(config: str, precision: str, asked: list[dict], jobs: int) -> list[dict]:
+    print(f"{config}, {precision}: {len(asked)} runs", file=sys.stderr, flush=True)
+    return run_trials(config, asked, {"estimator.ekf.precision": f'"{precision}"'}, jobs)
 
 
 def compared(single: list[dict], double: list[dict]) -> dict:
@@ -99,7 +86,7 @@ def main() -> int:
     result: dict = {k: getattr(options, k) for k in ("robots", "first", "fidelity", "duration_s")}
     try:
         for robot, config in ROBOTS.items():
-            both = (ran(root / config, p, asked, options.jobs) for p in ("single", "double"))
+            both = (ran(config, p, asked, options.jobs) for p in ("single", "double"))
             result[robot] = compared(*both)
     except UserError as problem:
         print(f"error: {problem}", file=sys.stderr)

@@ -6,19 +6,15 @@ tools/lab world looks for the worlds, and the conventions of the prints, whose r
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import tempfile
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from . import published
 from .experiments.control import CONDITIONS
 from .experiments.runs import NO_GATES
 from .experiments.table_6_1 import WITHIN
 from .inference import Parameter
-from .paths import UserError, binary, repository_root
+from .trials import run_trials
 
 DURATION_S = 15.0
 LOST_S = (6.0, 12.0)  # Fig. 6.28: "slowly lost balance after 8 seconds", as experiments/control.py has it
@@ -153,22 +149,7 @@ GROUPS = {  # [T]'s filters and gains
 
 def trials(settings: dict[str, object], asked: list[dict]) -> list[dict]:
     """Runs of `equipoise trials`, with upright_s."""
-    with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
-        request = Path(folder) / "in.json"
-        request.write_text(json.dumps({"trials": asked}))
-        command = [binary(), "trials", "--config", "config/mbbr.toml", "--in", request, "--jobs", "1"]
-        for key, value in settings.items():
-            command += ["--set", f"{key}={value}"]
-        ended = subprocess.run(
-            [str(word) for word in command],
-            capture_output=True,
-            text=True,
-            cwd=repository_root(),
-            check=False,
-        )
-        if ended.returncode != 0:
-            raise UserError(ended.stderr.strip())
-    found: list[dict] = json.loads(ended.stdout)["trials"]
+    found = run_trials("config/mbbr.toml", asked, settings, jobs=1)
     for row in found:
         row["upright_s"] = row["fell_at_s"] if row["fell"] else row["duration_s"]
     return found

@@ -88,7 +88,7 @@ def rows_table(found: Inference) -> list[str]:
     ]
     for row in found.rows:
         without = found.left_out(row.name)
-        for quantity in ("upright_s", *row.printed):
+        for quantity in row.quantities():
             cells = [row.name, WORDS[quantity], printed_of(row, quantity)]
             for draws in (found.kept, without):
                 share = weights_of(draws) @ np.array([agrees(row, quantity, d) for d in draws])
@@ -100,7 +100,7 @@ def rows_table(found: Inference) -> list[str]:
 
 def exclusions(found: Inference, at_least: int = 10) -> list[str]:
     """Pairs of statements that many draws meet, and none both; statements that none meets."""
-    statements = [(row, q) for row in found.rows for q in ("upright_s", *row.printed)]
+    statements = [(row, q) for row in found.rows for q in row.quantities()]
     met = np.array([[agrees(row, q, d) for row, q in statements] for d in found.draws])
     names = [f"{row.name}: {WORDS[q]} {printed_of(row, q)}" for row, q in statements]
     counts = met.sum(axis=0)
