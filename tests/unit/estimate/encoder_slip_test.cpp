@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "robots/mbbr/config.hpp"
 #include "robots/mbbr/ekf.hpp"
 #include "robots/mip/config.hpp"
@@ -44,6 +46,26 @@ TEST(EncoderSlip, AWheelThatSlipsMovesNoBall) {
     }
     EXPECT_LT(filter.estimate().phi_dot_star.norm(), 0.1 * most_rad_s) << wheel;
   }
+}
+
+/// Most that the ball turns, as the filter has it, while a wheel spins so for a tenth of a second.
+double most_ball_rate_rad_s(double wheel_rad_s) {
+  const MbbrConfig config = load_mbbr(configuration("mbbr"), {}).config;
+  MbbrEkf filter(config.robot, config.estimators.ekf);
+  filter.start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
+  auto z = at_rest<Mbbr::Sample>();
+  double most = 0.0;
+  for (int k = 1; k <= 120; ++k) {
+    if (k > 100) z.wheel_angle_rad(0) += kTickS * wheel_rad_s;
+    filter.predict(Vec3::Zero());
+    filter.update(z);
+    most = std::max(most, filter.estimate().phi_dot_star.norm());
+  }
+  return most;
+}
+
+TEST(EncoderSlip, AnMbbrFollowsAWheelTheLessTheFasterItSpins) {
+  EXPECT_LT(most_ball_rate_rad_s(100.0), 0.5 * most_ball_rate_rad_s(25.0));
 }
 
 TEST(EncoderSlip, AMotorInItsBacklashMovesNoWheel) {
