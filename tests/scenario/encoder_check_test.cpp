@@ -89,16 +89,19 @@ TYPED_TEST(EncoderCheckOnRobot, FindsAStuckEncoderOnADriveAndNamesTheWheel) {
 
 TEST(LostEncoder, TheBallBalancerRunsOnWithoutIt) {
   const app::Choice choice{"ekf", "scheduled", "nominal", false, ""};
-  for (std::size_t wheel = 0; wheel < 3; ++wheel) {
-    int tick = 0;
-    double stuck = 0.0;
-    const auto interfere = [&](RawSample& raw) {
-      if (++tick < 600) stuck = raw.encoder_counts[wheel];
-      raw.encoder_counts[wheel] = stuck;
-    };
-    const TrialEnd end = run_trial<MbbrFirmware>(choice, 7, 12.0, interfere);
-    EXPECT_EQ(end.arm_state, ArmState::kArmed) << "wheel " << wheel << " reasons " << end.reasons;
-    EXPECT_EQ(end.degraded, kWithoutWheelOne << wheel);
+  for (const int from_tick : {1, 600}) {  // before it arms, and in motion
+    for (std::size_t wheel = 0; wheel < 3; ++wheel) {
+      int tick = 0;
+      double stuck = 0.0;
+      const auto interfere = [&](RawSample& raw) {
+        if (++tick <= from_tick) stuck = raw.encoder_counts[wheel];
+        raw.encoder_counts[wheel] = stuck;
+      };
+      const TrialEnd end = run_trial<MbbrFirmware>(choice, 7, 12.0, interfere);
+      EXPECT_EQ(end.arm_state, ArmState::kArmed)
+          << "wheel " << wheel << " from " << from_tick << " reasons " << end.reasons;
+      EXPECT_EQ(end.degraded, kWithoutWheelOne << wheel) << "from " << from_tick;
+    }
   }
 }
 
