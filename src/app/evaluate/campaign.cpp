@@ -50,14 +50,8 @@ struct Case {
 };
 
 int fault_tick(Phase phase) {
-  switch (phase) {
-    case Phase::kDisarmed:
-      return 50;
-    case Phase::kArming:
-      return kArmTick - 1;
-    default:
-      return 500;
-  }
+  if (phase == Phase::kDisarmed) return 50;
+  return phase == Phase::kArming ? kArmTick - 1 : 500;
 }
 
 /// Runs with a random fault each, of random kind, time and length; between faults nothing may happen.

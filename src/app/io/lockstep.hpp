@@ -5,6 +5,8 @@
 // rules.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -30,7 +32,9 @@ class LockstepServer : NoCopy {
   int fd_ = -1;
 };
 
-enum class LockstepEnd { kRunning, kFinished, kPeerGone, kTimeout, kProtocol };
+enum class LockstepEnd : std::size_t { kRunning, kFinished, kPeerGone, kTimeout, kProtocol };
+inline constexpr std::array<const char*, 5> kLockstepEndNames{"running", "finished", "peer_gone", "timeout",
+                                                              "protocol"};
 
 class Lockstep : public Backend {
  public:

@@ -89,16 +89,9 @@ class Lines {
 };
 
 const char* word(std::int8_t state) {
-  switch (state) {
-    case command_session_t::WAITING:
-      return "waiting";
-    case command_session_t::ARMED:
-      return "armed";
-    case command_session_t::FAULT:
-      return "fault";
-    default:
-      return "off";
-  }
+  constexpr std::array<const char*, 4> kWords{"off", "waiting", "armed", "fault"};  // of command_session_t
+  const auto i = static_cast<std::size_t>(state);
+  return i < kWords.size() ? kWords[i] : kWords[0];
 }
 
 }  // namespace

@@ -18,21 +18,6 @@
 namespace equipoise::app {
 namespace {
 
-const char* name_of(LockstepEnd end) {
-  switch (end) {
-    case LockstepEnd::kPeerGone:
-      return "peer_gone";
-    case LockstepEnd::kTimeout:
-      return "timeout";
-    case LockstepEnd::kProtocol:
-      return "protocol";
-    case LockstepEnd::kRunning:
-    case LockstepEnd::kFinished:
-      break;
-  }
-  return "finished";
-}
-
 int run_lockstep(const RunArguments& a, const RobotType& robot) {
   Runner runner(a, robot, a.set, "");
   const LockstepServer server(a.socket);
@@ -58,7 +43,7 @@ int run_lockstep(const RunArguments& a, const RobotType& robot) {
     last = runner.run(engine.io(), ++trials, nullptr, begin);
     if (engine.end() != LockstepEnd::kRunning && engine.end() != LockstepEnd::kFinished &&
         last.end != "fell") {
-      last.end = name_of(engine.end());
+      last.end = kLockstepEndNames[static_cast<std::size_t>(engine.end())];
       last.error = engine.error();
     }
     if (engine.end() != LockstepEnd::kPeerGone || interrupted.load()) break;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/text/format.hpp"
 #include "app/text/json.hpp"
 
 namespace equipoise::app {
@@ -56,26 +57,12 @@ Verdict VerdictJudge::verdict(bool stopped, bool device_failed) const noexcept {
 }
 
 std::string Verdict::sentence() const {
+  constexpr std::array<const char*, 5> kHow{"Finished after", "Fell over at", "Disarmed unexpectedly at",
+                                            "Interrupted after", "The device failed after"};
+  const char* const how = kHow[static_cast<std::size_t>(ended)];
   const std::string why = reasons == 0 ? "" : ": " + reasons_text(reasons);
-  char text[80];
-  switch (ended) {
-    case Ended::kFell:
-      std::snprintf(text, sizeof text, "Fell over at %.2f s", fell_at_s);
-      return text + why;
-    case Ended::kDisarmed:
-      std::snprintf(text, sizeof text, "Disarmed unexpectedly at %.2f s", fell_at_s);
-      return text + why;
-    case Ended::kInterrupted:
-      std::snprintf(text, sizeof text, "Interrupted after %.1f s", duration_s);
-      break;
-    case Ended::kDevice:
-      std::snprintf(text, sizeof text, "The device failed after %.1f s", duration_s);
-      break;
-    case Ended::kFinished:
-      std::snprintf(text, sizeof text, "Finished after %.1f s", duration_s);
-      break;
-  }
-  return text + (reasons == 0 ? ", upright" : ", motors off" + why);
+  if (fell()) return format("%s %.2f s", how, fell_at_s) + why;
+  return format("%s %.1f s", how, duration_s) + (reasons == 0 ? ", upright" : ", motors off" + why);
 }
 
 void Verdict::write(nlohmann::json* out) const {
