@@ -2,14 +2,13 @@
 
 #include <unistd.h>
 
-#include <cstdio>
-#include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
 
-#include "app/cli/commands.hpp"
+#include "app/text/errors.hpp"
 #include "app/text/files.hpp"
+#include "app/text/json.hpp"
 #include "config/toml_reader.hpp"
 
 namespace equipoise::app {
@@ -77,31 +76,14 @@ CalibrationFile read(const Document& document) {
   return file;
 }
 
-/// Round trip exact; a TOML float needs a point or an exponent.
-std::string toml_number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return std::strpbrk(text, ".en") != nullptr ? text : std::string(text) + ".0";
+/// Numbers, texts and arrays of them are the same in TOML as in JSON; numbers come back exactly.
+std::string line(const char* key, const nlohmann::json& value) {
+  return std::string(key) + " = " + value.dump() + "\n";
 }
 
-std::string toml_array(const std::vector<double>& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "[" : ", ") + toml_number(value);
-  return text + "]";
-}
-
-std::string toml_array(const Vec3& v) { return toml_array(std::vector<double>(v.data(), v.data() + 3)); }
-
-std::string text_of(const CalibrationFile::Stamp& stamp) {
-  std::string text = "date = \"" + stamp.date + "\"\n";
-  if (stamp.temperature_degC) text += "temperature_degC = " + toml_number(*stamp.temperature_degC) + "\n";
-  return text;
-}
-
-std::string indices_of(const std::vector<int>& values) {
-  std::string text;
-  for (const int value : values) text += (text.empty() ? "[" : ", ") + std::to_string(value);
-  return text + "]";
+std::string head(const char* table, const CalibrationFile::Stamp& stamp) {
+  return "\n[" + std::string(table) + "]\n" + line("date", stamp.date) +
+         (stamp.temperature_degC ? line("temperature_degC", *stamp.temperature_degC) : "");
 }
 
 }  // namespace
@@ -133,35 +115,26 @@ CalibrationFile load_calibration(const std::string& path, const std::string& rob
 }
 
 std::string to_toml(const CalibrationFile& file) {
+  const auto list = [](const auto& m) { return std::vector<double>(m.data(), m.data() + m.size()); };
   std::string text =
       "# Made by equipoise calibrate; axes of the sensor, SI units. A board file names it: [board] "
       "calibration.\n";
-  text += "version = " + std::to_string(kVersion) + "\nrobot = \"" + file.robot +
-          "\"\nwheels = " + std::to_string(file.wheel_count) + "\n";
-  if (file.gyro) {
-    text += "\n[gyro]\n" + text_of(file.gyro->stamp) + "bias_rad_s = " + toml_array(file.gyro->bias_rad_s) +
-            "\nsigma_rad_s = " + toml_array(file.gyro->sigma_rad_s) + "\n";
+  text += line("version", kVersion) + line("robot", file.robot) + line("wheels", file.wheel_count);
+  if (const auto& gyro = file.gyro) {
+    text += head("gyro", gyro->stamp) + line("bias_rad_s", list(gyro->bias_rad_s)) +
+            line("sigma_rad_s", list(gyro->sigma_rad_s));
   }
-  if (file.accel) {
-    text += "\n[accel]\n" + text_of(file.accel->stamp) + "scale = " + toml_array(file.accel->scale) +
-            "\nbias_m_s2 = " + toml_array(file.accel->bias_m_s2) +
-            "\ncheck_error_m_s2 = " + toml_number(file.accel->check_error_m_s2) + "\n";
+  if (const auto& accel = file.accel) {
+    text += head("accel", accel->stamp) + line("scale", list(accel->scale)) +
+            line("bias_m_s2", list(accel->bias_m_s2)) + line("check_error_m_s2", accel->check_error_m_s2);
   }
-  if (file.mount) {
-    const RowMajor rows = file.mount->R_BS;
-    text += "\n[mount]\n" + text_of(file.mount->stamp) +
-            "R_BS = " + toml_array(std::vector<double>(rows.data(), rows.data() + rows.size())) + "\n";
+  if (file.mount) text += head("mount", file.mount->stamp) + line("R_BS", list(RowMajor(file.mount->R_BS)));
+  if (const auto& motors = file.motors) {
+    text += head("motors", motors->stamp) + line("wheel_of_motor", motors->wheel_of_motor) +
+            line("encoder_of_motor", motors->encoder_of_motor) + line("drive", motors->drive);
   }
-  if (file.motors) {
-    text += "\n[motors]\n" + text_of(file.motors->stamp) +
-            "wheel_of_motor = " + indices_of(file.motors->wheel_of_motor) +
-            "\nencoder_of_motor = " + indices_of(file.motors->encoder_of_motor) +
-            "\ndrive = " + toml_array(file.motors->drive) + "\n";
-  }
-  if (file.encoders) {
-    text += "\n[encoders]\n" + text_of(file.encoders->stamp) +
-            "counts_per_rev = " + toml_array(file.encoders->counts_per_rev) + "\n";
-  }
+  if (file.encoders)
+    text += head("encoders", file.encoders->stamp) + line("counts_per_rev", file.encoders->counts_per_rev);
   return text;
 }
 
