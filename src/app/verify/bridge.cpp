@@ -32,14 +32,7 @@ void add_bridge(Subcommand app) {
   const Subcommand command =
       app.subcommand("bridge", "Mean current of a drive/coast bridge, and its inverse, on rows of JSON")
           .example("equipoise bridge --in rows.json --json -");
-  auto in = std::make_shared<std::string>();
-  auto json = std::make_shared<std::string>("-");
-  command.option("--in", *in, "rows of {T_r, omega_r, u} or {T_r, omega_r, i_over_is}").required();
-  command.option("--json", *json, "output file, - for stdout").file().show_default();
-  command.action([=] {
-    write_json(map_rows(*in, evaluate), *json);
-    return 0;
-  });
+  add_rows(command, "rows of {T_r, omega_r, u} or {T_r, omega_r, i_over_is}", [] { return evaluate; });
 }
 
 }  // namespace equipoise::app

@@ -41,11 +41,9 @@ nlohmann::json evaluate_mip(const MipDynamics& dynamics, const nlohmann::json& r
           {"qdd", array_of(qdd)}, {"accel_B", array_of(dynamics.accelerometer_B(m, qdd))}};
 }
 
-using Model = std::function<nlohmann::json(const nlohmann::json&)>;
-
 /// By the robot's name.
-const std::map<std::string, Model>& models() {
-  static const std::map<std::string, Model> all{
+const std::map<std::string, Row>& models() {
+  static const std::map<std::string, Row> all{
       {"mbbr", [dynamics = MbbrDynamics{MbbrParameters{}}](
                    const nlohmann::json& row) { return evaluate_mbbr(dynamics, row); }},
       {"mip", [dynamics = MipDynamics{MipParameters{}}](const nlohmann::json& row) {
@@ -61,19 +59,11 @@ void add_model(Subcommand app) {
       app.subcommand("model", "Evaluates the exact plant, published parameters, on rows of JSON")
           .example("equipoise model --robot mbbr --in rows.json --json -");
   auto robot = std::make_shared<std::string>();
-  auto in = std::make_shared<std::string>();
-  auto json = std::make_shared<std::string>("-");
   command.option("--robot", *robot, "mbbr or mip").required().one_of({"mbbr", "mip"});
-  command
-      .option("--in", *in,
-              "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
-              "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}")
-      .required();
-  command.option("--json", *json, "output file, - for stdout").file().show_default();
-  command.action([=] {
-    write_json(map_rows(*in, models().at(*robot)), *json);
-    return 0;
-  });
+  add_rows(command,
+           "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
+           "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}",
+           [=] { return models().at(*robot); });
 }
 
 }  // namespace equipoise::app

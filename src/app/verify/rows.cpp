@@ -4,8 +4,9 @@
 
 namespace equipoise::app {
 
-nlohmann::json map_rows(const std::string& path,
-                        const std::function<nlohmann::json(const nlohmann::json&)>& row) {
+namespace {
+
+nlohmann::json map_rows(const std::string& path, const Row& row) {
   const nlohmann::json in = read_json(path);
   if (!in.is_object() || !in.contains("rows") || !in["rows"].is_array()) {
     throw InputError(path + ": expected an object with an array \"rows\"");
@@ -22,6 +23,19 @@ nlohmann::json map_rows(const std::string& path,
     ++index;
   }
   return {{"rows", rows}};
+}
+
+}  // namespace
+
+void add_rows(const Subcommand& command, const std::string& in_help, const std::function<Row()>& row) {
+  auto in = std::make_shared<std::string>();
+  auto json = std::make_shared<std::string>("-");
+  command.option("--in", *in, in_help).required();
+  command.option("--json", *json, "output file, - for stdout").file().show_default();
+  command.action([=] {
+    write_json(map_rows(*in, row()), *json);
+    return 0;
+  });
 }
 
 double number_at(const nlohmann::json& row, const std::string& key) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "app/cli/commands.hpp"
 #include "app/text/json.hpp"
@@ -9,9 +10,11 @@
 
 namespace equipoise::app {
 
-/// Applies `row` to every row of the file; errors name the file, the row and the key.
-nlohmann::json map_rows(const std::string& path,
-                        const std::function<nlohmann::json(const nlohmann::json&)>& row);
+using Row = std::function<nlohmann::json(const nlohmann::json&)>;
+
+/// The command applies a row's function to every row of --in; errors name the file, the row and the key.
+/// `row`: makes it, when the command's options are known.
+void add_rows(const Subcommand& command, const std::string& in_help, const std::function<Row()>& row);
 
 double number_at(const nlohmann::json& row, const std::string& key);
 Eigen::VectorXd numbers_at(const nlohmann::json& row, const std::string& key, Eigen::Index count);
