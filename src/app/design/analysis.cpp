@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "app/design/whole_loop.hpp"
+#include "app/trial/firmware.hpp"
 #include "equipoise/sense/rotor_speed.hpp"
 #include "robots/mbbr/config.hpp"
 #include "robots/mbbr/high_yaw.hpp"
@@ -234,27 +235,11 @@ nlohmann::json plant_json(const CMatrix& A, const CMatrix& b, const CMatrix& K, 
           {"poles", complex_list(closed_loop_poles(s, K))}};
 }
 
-std::size_t index_of(const std::vector<std::string>& names, const std::string& name) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) throw ConfigError("--estimator " + name + ": not known to this robot");
-  return static_cast<std::size_t>(found - names.begin());
-}
-
-/// The controller asked for; the first where none is.
-std::string controller_of(const DesignRequest& a, const std::array<const char*, 2>& known) {
-  if (a.controller.empty()) return known[0];
-  if (a.controller != known[0] && a.controller != known[1])
-    throw ConfigError("--controller " + a.controller + ": allowed: " + known[0] + ", " + known[1]);
-  return a.controller;
-}
-
-std::string estimator_of(const DesignRequest& a) { return a.estimator.empty() ? "ekf" : a.estimator; }
-
 /// Adds to `out`, which holds what is the robot's own, the choices and row_at(yaw rate, rad/s) for each one.
-nlohmann::json with_rows(const DesignRequest& a, const std::string& controller, const std::string& sha256,
+nlohmann::json with_rows(const DesignRequest& a, const Choice& choice, const std::string& sha256,
                          nlohmann::json out, const std::function<nlohmann::json(double)>& row_at) {
-  out["estimator"] = estimator_of(a);
-  out["controller"] = controller;
+  out["estimator"] = choice.estimator;
+  out["controller"] = choice.controller;
   out["config_sha256"] = sha256;
   for (int i = 0; i * a.step_hz <= a.last_hz + 1e-9; ++i) {
     const double hz = i * a.step_hz;
@@ -266,12 +251,10 @@ nlohmann::json with_rows(const DesignRequest& a, const std::string& controller, 
   return out;
 }
 
-nlohmann::json mbbr_design(const DesignRequest& a) {
+nlohmann::json mbbr_design(const DesignRequest& a, const Choice& choice, std::size_t estimator) {
   Loaded<MbbrConfig> loaded = load_mbbr(a.config, a.set);
   MbbrConfig& c = loaded.config;
-  c.estimators.active = static_cast<MbbrEstimatorId>(
-      index_of({kMbbrEstimatorNames.begin(), kMbbrEstimatorNames.end()}, estimator_of(a)));
-  const std::string controller = controller_of(a, {"scheduled", "thesis"});
+  c.estimators.active = static_cast<MbbrEstimatorId>(estimator);
   c.reference.budget = DutyBudget{};
 
   const MbbrGains& g = c.scheduled.gains;
@@ -284,10 +267,10 @@ nlohmann::json mbbr_design(const DesignRequest& a) {
                              {"yaw_angle", g.yaw_angle},
                              {"yaw_rate", g.yaw_rate},
                              {"yaw_feedforward", g.yaw_feedforward}}}};
-  return with_rows(a, controller, loaded.sha256, out, [&](double yaw_rate) {
+  return with_rows(a, choice, loaded.sha256, out, [&](double yaw_rate) {
     const Plant plant = mbbr_plant(c.robot, yaw_rate, c.chain);
     nlohmann::json row =
-        controller == "thesis"
+        choice.controller == "thesis"
             ? judged(plant, SettledControllerOf<MbbrSpin, MbbrThesisFeedback>(c, c.thesis, yaw_rate), a.bode)
             : judged(plant, SettledControllerOf<MbbrSpin, MbbrScheduledFeedback>(c, c.scheduled, yaw_rate),
                      a.bode);
@@ -302,12 +285,10 @@ nlohmann::json to_json(const SecondOrder& d) {
   return {{"numerator", {d.b0, d.b1, d.b2}}, {"denominator", {1.0, d.a1, d.a2}}};
 }
 
-nlohmann::json mip_design(const DesignRequest& a) {
+nlohmann::json mip_design(const DesignRequest& a, const Choice& choice, std::size_t estimator) {
   Loaded<MipConfig> loaded = load_mip(a.config, a.set);
   MipConfig& c = loaded.config;
-  c.estimators.active = static_cast<MipEstimatorId>(
-      index_of({kMipEstimatorNames.begin(), kMipEstimatorNames.end()}, estimator_of(a)));
-  const std::string controller = controller_of(a, {"slc", "lqr"});
+  c.estimators.active = static_cast<MipEstimatorId>(estimator);
   c.reference.budget = DutyBudget{};
   c.reference.max_phi_error_rad = kUnlimited;
   c.slc.max_lean_rad = c.slc.max_u = c.lqr.max_lean_rad = c.lqr.max_u = kUnlimited;
@@ -325,10 +306,10 @@ nlohmann::json mip_design(const DesignRequest& a) {
         {"yaw_feedforward", g.yaw.feedforward}}}};
   CMatrix K(1, 5);
   K << g.lqr.theta, g.lqr.phi, g.lqr.theta_dot, g.lqr.phi_dot, -g.lqr.u_before;
-  return with_rows(a, controller, loaded.sha256, out, [&](double yaw_rate) {
+  return with_rows(a, choice, loaded.sha256, out, [&](double yaw_rate) {
     const Plant plant = mip_plant(c.robot, yaw_rate, c.chain);
     nlohmann::json row =
-        controller == "lqr"
+        choice.controller == "lqr"
             ? judged(plant, SettledControllerOf<MipSpin, MipLqrFeedback>(c, c.lqr, yaw_rate), a.bode)
             : judged(plant, SettledControllerOf<MipSpin, MipSlcFeedback>(c, c.slc, yaw_rate), a.bode);
     const MipLinear linear = mip_linear(c.robot, yaw_rate);
@@ -340,9 +321,16 @@ nlohmann::json mip_design(const DesignRequest& a) {
 }  // namespace
 
 nlohmann::json design(const DesignRequest& request) {
-  const std::string type = robot_type(request.config);
-  if (type == "mbbr") return mbbr_design(request);
-  if (type == "mip") return mip_design(request);
+  const RobotType& robot = robot_type_of(robot_type(request.config), request.config);
+  Choice choice;
+  choice.estimator = request.estimator;
+  choice.controller = request.controller;
+  complete(robot, &choice);
+  const auto found = std::find(robot.estimators.begin(), robot.estimators.end(), choice.estimator);
+  const auto estimator = static_cast<std::size_t>(found - robot.estimators.begin());
+  const std::string type = robot.name;
+  if (type == "mbbr") return mbbr_design(request, choice, estimator);
+  if (type == "mip") return mip_design(request, choice, estimator);
   throw ConfigError(request.config + ": robot.type: \"" + type + "\" has no design; allowed: mbbr, mip");
 }
 
