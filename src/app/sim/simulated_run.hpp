@@ -12,6 +12,61 @@
 
 namespace equipoise::app {
 
+/// What a run's summary counts, tick by tick.
+class RunMeter {
+ public:
+  RunMeter(const ConfiguredRobot& robot, const Firmware& firmware, const Script& script)
+      : robot_(robot), firmware_(firmware), script_(script), compared_(robot.type->estimators.size()) {}
+
+  void observe(const runtime::TickRecord& t, const StateView& truth, double time_s);
+  SimSummary summary(const Verdict& verdict, std::int64_t ticks, double wall_s) const;
+
+ private:
+  class Rms {
+   public:
+    void add(double squared, int axes) {
+      sum_ += squared;
+      count_ += axes;
+    }
+    double value() const;
+    bool empty() const { return count_ == 0; }
+
+   private:
+    double sum_ = 0.0;
+    std::int64_t count_ = 0;
+  };
+  class Errors {
+   public:
+    void add(const StateErrors& e) {
+      attitude_.add(e.attitude_squared, e.axes);
+      speed_.add(e.speed_squared, e.axes);
+    }
+    EstimatorErrors value() const { return {attitude_.value(), speed_.value()}; }
+
+   private:
+    Rms attitude_, speed_;
+  };
+
+  const ConfiguredRobot& robot_;
+  const Firmware& firmware_;
+  const Script& script_;
+  Errors controlling_;
+  std::vector<Errors> compared_;
+  Rms position_, following_, rolling_;
+  Vec2 path_start_W_m_ = Vec2::Zero();
+  double innovation_sum_ = 0.0;
+  std::int64_t innovations_ = 0;
+  double heading_error_ = kUncounted;
+  double yaw_from_ = 0.0;
+  double yaw_from_s_ = -1.0;
+  double yaw_to_ = 0.0;
+  double yaw_to_s_ = 0.0;
+  double duty_max_ = 0.0;
+  std::int64_t saturated_ = 0;
+  std::int64_t driven_ = 0;
+  std::uint32_t degraded_ = 0;
+};
+
 class SimulatedRun : NoCopy {
  public:
   /// World, firmware, observer and stop must outlive it.
@@ -35,11 +90,9 @@ class SimulatedRun : NoCopy {
   auto commands();
   auto observer();
   void observe(std::int64_t tick, const runtime::TickRecord& t);
-  void measure(const runtime::TickRecord& t, const StateView& truth, double time_s);
 
   World& world_;
   Firmware& firmware_;
-  const RobotType& robot_;
   SimOptions options_;
   const TickObserver& observe_;
   const std::atomic<bool>& stop_;
@@ -52,8 +105,6 @@ class SimulatedRun : NoCopy {
   std::int64_t end_tick_;
   std::atomic<bool> done_{false};
   runtime::LoopEnd end_;
-  std::uint32_t degraded_ = 0;
-  double wall_s_ = 0.0;
 };
 
 }  // namespace equipoise::app
