@@ -68,9 +68,4 @@ Margins margins(const std::vector<double>& omega_rad_s, const std::vector<std::c
   return m;
 }
 
-Margins worse(const Margins& a, const Margins& b) {
-  return {std::min(a.gain_up_dB, b.gain_up_dB), std::max(a.gain_down_dB, b.gain_down_dB),
-          std::min(a.phase_deg, b.phase_deg), std::min(a.delay_s, b.delay_s), std::min(a.disk, b.disk)};
-}
-
 }  // namespace equipoise

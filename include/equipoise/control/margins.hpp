@@ -24,7 +24,5 @@ struct Margins {
 /// followed through zero and `centre_rad_s`, where integrators make it infinite.
 Margins margins(const std::vector<double>& omega_rad_s, const std::vector<std::complex<double>>& L,
                 double centre_rad_s, double slow_rad_s = 0.0);
-/// The worse of each.
-Margins worse(const Margins& a, const Margins& b);
 
 }  // namespace equipoise

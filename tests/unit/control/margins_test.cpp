@@ -141,17 +141,5 @@ TEST(Margins, BetweenTwoPointsTheCurveIsFollowed) {
   EXPECT_TRUE(std::isinf(margins({0.5}, {-std::polar(2.0, 0.25)}, 0.0).phase_deg)) << "one point is none";
 }
 
-TEST(Margins, TheWorseOfTwoIsTheWorseInEach) {
-  const Margins a{6.0, -3.0, 40.0, 0.01, 1.0};
-  const Margins b{5.0, -4.0, 50.0, 0.02, 0.5};
-  for (const Margins& m : {worse(a, b), worse(b, a)}) {
-    EXPECT_EQ(m.gain_up_dB, 5.0);
-    EXPECT_EQ(m.gain_down_dB, -3.0);
-    EXPECT_EQ(m.phase_deg, 40.0);
-    EXPECT_EQ(m.delay_s, 0.01);
-    EXPECT_EQ(m.disk, 0.5);
-  }
-}
-
 }  // namespace
 }  // namespace equipoise
