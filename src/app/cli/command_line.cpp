@@ -42,9 +42,8 @@ std::string url_error(const std::string& url) {
   return url.rfind("tcpq:", 0) == 0 ? url + ": ends the program when its server does; use udpm" : "";
 }
 
-CLI::Option* checked(CLI::Option* option, std::string (*error)(const std::string&)) {
+void checked(CLI::Option* option, std::string (*error)(const std::string&)) {
   option->check(CLI::Validator(error, std::string{}));
-  return option;
 }
 
 constexpr const char* kFileType = "FILE";
@@ -176,34 +175,21 @@ Subcommand Subcommand::subcommand(const std::string& name, const std::string& he
 }
 void Subcommand::require_subcommand() const { app_of(impl_)->require_subcommand(1); }
 
-Option Subcommand::option(const std::string& name, std::string& value, const std::string& help) const {
-  CLI::Option* option = app_of(impl_)->add_option(name, value, help);
-  if (name == "--json") checked(option, json_output_error);  // before the job
-  if (name == "--telemetry" || name == "--command-url" || name == "--url") checked(option, url_error);
-  return Option(option);
-}
-Option Subcommand::option(const std::string& name, double& value, const std::string& help) const {
-  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<double>));
-}
-Option Subcommand::option(const std::string& name, int& value, const std::string& help) const {
-  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<int>));
-}
-Option Subcommand::option(const std::string& name, std::int64_t& value, const std::string& help) const {
-  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<std::int64_t>));
-}
-Option Subcommand::option(const std::string& name, std::uint64_t& value, const std::string& help) const {
-  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<std::uint64_t>));
-}
-Option Subcommand::option(const std::string& name, std::vector<std::string>& value,
-                          const std::string& help) const {
-  return Option(app_of(impl_)->add_option(name, value, help));
-}
-Option Subcommand::option(const std::string& name, std::vector<double>& value,
-                          const std::string& help) const {
-  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<double>));
-}
-Option Subcommand::option(const std::string& name, std::vector<int>& value, const std::string& help) const {
-  return Option(checked(app_of(impl_)->add_option(name, value, help), number_error<int>));
+Option Subcommand::option(const std::string& name, Value value, const std::string& help) const {
+  const auto add = [&](auto reference) {
+    using T = typename decltype(reference)::type;
+    CLI::Option* option = app_of(impl_)->add_option(name, reference.get(), help);
+    if constexpr (std::is_same_v<T, std::string>) {
+      if (name == "--json") checked(option, json_output_error);  // before the job
+      if (name == "--telemetry" || name == "--command-url" || name == "--url") checked(option, url_error);
+    } else if constexpr (std::is_arithmetic_v<T>) {
+      checked(option, number_error<T>);
+    } else if constexpr (std::is_arithmetic_v<typename T::value_type>) {
+      checked(option, number_error<typename T::value_type>);
+    }
+    return Option(option);
+  };
+  return std::visit(add, value);
 }
 Option Subcommand::flag(const std::string& name, bool& value, const std::string& help) const {
   return Option(app_of(impl_)->add_flag(name, value, help));

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "app/cli/description.hpp"
@@ -37,17 +38,17 @@ class Option {
 /// "file".
 class Subcommand {
  public:
+  /// Where an option's value goes, by its type.
+  using Value =
+      std::variant<std::reference_wrapper<std::string>, std::reference_wrapper<double>,
+                   std::reference_wrapper<int>, std::reference_wrapper<std::int64_t>,
+                   std::reference_wrapper<std::uint64_t>, std::reference_wrapper<std::vector<std::string>>,
+                   std::reference_wrapper<std::vector<double>>, std::reference_wrapper<std::vector<int>>>;
+
   Subcommand subcommand(const std::string& name, const std::string& help) const;
   void require_subcommand() const;
 
-  Option option(const std::string& name, std::string& value, const std::string& help = "") const;
-  Option option(const std::string& name, double& value, const std::string& help = "") const;
-  Option option(const std::string& name, int& value, const std::string& help = "") const;
-  Option option(const std::string& name, std::int64_t& value, const std::string& help = "") const;
-  Option option(const std::string& name, std::uint64_t& value, const std::string& help = "") const;
-  Option option(const std::string& name, std::vector<std::string>& value, const std::string& help = "") const;
-  Option option(const std::string& name, std::vector<double>& value, const std::string& help = "") const;
-  Option option(const std::string& name, std::vector<int>& value, const std::string& help = "") const;
+  Option option(const std::string& name, Value value, const std::string& help = "") const;
   /// "--yes" or "--yes,!--no".
   Option flag(const std::string& name, bool& value, const std::string& help = "") const;
 
