@@ -20,16 +20,6 @@ struct Arguments {
   std::string json;
 };
 
-struct Configuration {
-  std::vector<KeyFacts> keys;
-  std::string toml;
-};
-
-Configuration read(const std::string& path, const std::vector<std::string>& set) {
-  const auto robot = load_robot(path, set);
-  return {robot->keys, robot->toml};
-}
-
 bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
@@ -132,10 +122,10 @@ void print_explained(const KeyFacts& facts) {
 }
 
 int explain(const Arguments& a) {
-  const Configuration configuration = read(a.config, a.set);
+  const auto robot = load_robot(a.config, a.set);
   nlohmann::json rows = nlohmann::json::array();
   std::vector<std::string> alike;
-  for (const KeyFacts& facts : configuration.keys) {
+  for (const KeyFacts& facts : robot->keys) {
     const bool below =
         facts.key.rfind(a.key, 0) == 0 && (facts.key[a.key.size()] == '.' || facts.key[a.key.size()] == '[');
     if (facts.key != a.key && !below) {
@@ -155,13 +145,13 @@ int explain(const Arguments& a) {
 }
 
 int show(const Arguments& a) {
-  const Configuration configuration = read(a.config, a.set);
+  const auto robot = load_robot(a.config, a.set);
   if (a.json.empty()) {
-    std::printf("%s\n", configuration.toml.c_str());
+    std::printf("%s\n", robot->toml.c_str());
     return 0;
   }
   nlohmann::json values = nlohmann::json::object();
-  for (const KeyFacts& facts : configuration.keys) values[facts.key] = value_of(facts);
+  for (const KeyFacts& facts : robot->keys) values[facts.key] = value_of(facts);
   write_json(values, a.json);
   return 0;
 }
@@ -170,9 +160,9 @@ int diff(const Arguments& a) {
   const bool itself = a.other.empty();
   if (itself && a.set.empty()) throw InputError("config diff: name a second file, or what to --set");
   std::map<std::string, std::array<const KeyFacts*, 2>> keys;
-  const std::array<Configuration, 2> sides{read(a.config, {}), read(itself ? a.config : a.other, a.set)};
+  const std::array sides{load_robot(a.config, {}), load_robot(itself ? a.config : a.other, a.set)};
   for (std::size_t i = 0; i < sides.size(); ++i) {
-    for (const KeyFacts& facts : sides[i].keys) keys[facts.key][i] = &facts;
+    for (const KeyFacts& facts : sides[i]->keys) keys[facts.key][i] = &facts;
   }
   nlohmann::json rows = nlohmann::json::object();
   for (const auto& [key, facts] : keys) {
