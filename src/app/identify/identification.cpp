@@ -22,11 +22,6 @@ double sample_s(const BenchLog& log) {
   return (log.rows.back().t_s - log.rows.front().t_s) / static_cast<double>(log.rows.size() - 1);
 }
 
-/// Mean rate over the sample that ends at i.
-double rate(const BenchLog& log, std::size_t i) {
-  return (log.rows[i].angle_rad - log.rows[i - 1].angle_rad) / (log.rows[i].t_s - log.rows[i - 1].t_s);
-}
-
 /// Why the samples cannot be used at all; `electrical`: current and supply are needed.
 std::string unusable(const BenchLog& log, bool electrical) {
   if (log.rows.size() < kMinSamples) {
@@ -214,7 +209,7 @@ std::vector<Window> windows_in_motion(const BenchLog& log, double min_rate_rad_s
     for (std::size_t m = first + 1; m <= last; ++m) {
       const double from_centre = std::abs(static_cast<double>(m) - static_cast<double>(i) - 0.5);
       const double weight = static_cast<double>(kHalf) - from_centre;
-      w.rate += weight * rate(log, m);
+      w.rate += weight * slope(log, m - 1, m);
       w.current_A += weight * log.rows[m].current_A;
       w.u += weight * log.rows[m].u;
       weights += weight;
