@@ -4,16 +4,12 @@
 #include <cstdio>
 
 #include "config/toml_reader.hpp"
+#include "equipoise/plant/noise.hpp"
 
 namespace equipoise::config {
 namespace {
 
-std::uint64_t splitmix64(std::uint64_t z) noexcept {
-  z += 0x9E3779B97F4A7C15ULL;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-  return z ^ (z >> 31);
-}
+std::uint64_t splitmix64(std::uint64_t z) noexcept { return mixed(z + 0x9E3779B97F4A7C15ULL); }
 
 double unit(std::int64_t robot, const std::string& key, std::uint64_t element) noexcept {
   std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a

@@ -66,7 +66,7 @@ enum NoiseEffect : std::uint64_t {
   kLoop
 };
 
-/// splitmix64: neighbouring numbers give unrelated ones.
+/// The mixing of splitmix64: neighbouring numbers give unrelated ones.
 inline std::uint64_t mixed(std::uint64_t z) noexcept {
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
   z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
