@@ -30,7 +30,7 @@ void refuse_ill_machine(const Commissioning& commissioning, const std::string& b
   patient.board = &commissioning.board();
   patient.board_path = board_path;
   const doctor::Findings findings = doctor::examine(patient);
-  for (const doctor::Finding& f : findings.all()) {
+  for (const doctor::Finding& f : findings) {
     // Not looked at is as bad as bad: this machine is no robot.
     if (f.verdict == doctor::Verdict::kFail || (f.name == "board" && f.verdict == doctor::Verdict::kSkipped))
       throw JobError("doctor: " + f.name + ": " + f.what + "; " + f.fix);

@@ -13,11 +13,11 @@ namespace {
 
 nlohmann::json to_json(const doctor::Patient& patient, const doctor::Findings& findings) {
   nlohmann::json checks = nlohmann::json::array();
-  for (const doctor::Finding& f : findings.all()) {
+  for (const doctor::Finding& f : findings) {
     checks.push_back(
         {{"name", f.name}, {"verdict", doctor::name_of(f.verdict)}, {"what", f.what}, {"fix", f.fix}});
   }
-  return {{"ok", findings.healthy()},
+  return {{"ok", doctor::healthy(findings)},
           {"board", patient.board == nullptr ? nlohmann::json(nullptr) : nlohmann::json(patient.board_path)},
           {"checks", checks},
           {"version", version()}};
@@ -25,7 +25,7 @@ nlohmann::json to_json(const doctor::Patient& patient, const doctor::Findings& f
 
 void print(const doctor::Findings& findings, std::FILE* out) {
   std::array<int, 4> count{};
-  for (const doctor::Finding& f : findings.all()) {
+  for (const doctor::Finding& f : findings) {
     ++count[static_cast<std::size_t>(f.verdict)];
     std::fprintf(out, "%-8s %-20s %s\n", doctor::name_of(f.verdict), f.name.c_str(), f.what.c_str());
     if (!f.fix.empty()) std::fprintf(out, "%-8s %-20s   -> %s\n", "", "", f.fix.c_str());
@@ -61,7 +61,7 @@ int run_doctor(const Arguments& a) {
     doctor::write_report(patient, findings, a.report);
     std::fprintf(stderr, "written to %s: send this with your question\n", a.report.c_str());
   }
-  return findings.healthy() ? 0 : 1;
+  return doctor::healthy(findings) ? 0 : 1;
 }
 
 }  // namespace

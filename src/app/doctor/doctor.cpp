@@ -1,5 +1,6 @@
 #include "app/doctor/doctor.hpp"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
@@ -25,11 +26,20 @@ const char* name_of(Verdict verdict) {
   return kNames[static_cast<std::size_t>(verdict)];
 }
 
-bool Findings::healthy() const {
-  for (const Finding& finding : all_) {
-    if (finding.verdict == Verdict::kFail) return false;
-  }
-  return true;
+Finding passed(const std::string& name, const std::string& what) { return {name, Verdict::kOk, what, ""}; }
+Finding warning(const std::string& name, const std::string& what, const std::string& fix) {
+  return {name, Verdict::kWarn, what, fix};
+}
+Finding failure(const std::string& name, const std::string& what, const std::string& fix) {
+  return {name, Verdict::kFail, what, fix};
+}
+Finding skipped(const std::string& name, const std::string& what, const std::string& fix) {
+  return {name, Verdict::kSkipped, what, fix};
+}
+
+bool healthy(const Findings& findings) {
+  return std::none_of(findings.begin(), findings.end(),
+                      [](const Finding& f) { return f.verdict == Verdict::kFail; });
 }
 
 std::string first_line(const std::string& path) {
@@ -52,12 +62,12 @@ Findings examine(const Patient& asked) {
     examine_buses(patient, &findings);
     examine_pins(patient, &findings);
   } else if (asked.board != nullptr) {
-    findings.skip("board",
-                  asked.board_path + " is a board file without an error; what it names is on a robot",
-                  "on the robot: equipoise doctor --board " + asked.board_path);
+    findings.push_back(
+        skipped("board", asked.board_path + " is a board file without an error; what it names is on a robot",
+                "on the robot: equipoise doctor --board " + asked.board_path));
   } else {
-    findings.skip("board", "no board file given: nothing of a robot was looked at",
-                  "equipoise doctor --board config/boards/robotics_cape_mbbr.toml");
+    findings.push_back(skipped("board", "no board file given: nothing of a robot was looked at",
+                               "equipoise doctor --board config/boards/robotics_cape_mbbr.toml"));
   }
   return findings;
 }

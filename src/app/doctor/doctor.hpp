@@ -20,26 +20,13 @@ struct Finding {
   std::string fix;   // a command to copy, or what to do; empty when nothing has to be done
 };
 
-class Findings {
- public:
-  void ok(const std::string& name, const std::string& what) { add({name, Verdict::kOk, what, ""}); }
-  void warn(const std::string& name, const std::string& what, const std::string& fix) {
-    add({name, Verdict::kWarn, what, fix});
-  }
-  void fail(const std::string& name, const std::string& what, const std::string& fix) {
-    add({name, Verdict::kFail, what, fix});
-  }
-  void skip(const std::string& name, const std::string& what, const std::string& fix = "") {
-    add({name, Verdict::kSkipped, what, fix});
-  }
-  const std::vector<Finding>& all() const { return all_; }
-  bool healthy() const;  // nothing fails
+Finding passed(const std::string& name, const std::string& what);
+Finding warning(const std::string& name, const std::string& what, const std::string& fix);
+Finding failure(const std::string& name, const std::string& what, const std::string& fix);
+Finding skipped(const std::string& name, const std::string& what, const std::string& fix = "");
 
- private:
-  void add(Finding finding) { all_.push_back(std::move(finding)); }
-
-  std::vector<Finding> all_;
-};
+using Findings = std::vector<Finding>;
+bool healthy(const Findings& findings);  // nothing fails
 
 struct Patient {
   std::string root;              // "": this machine; a directory in tests

@@ -40,7 +40,8 @@ void examine_loaded(const Patient& patient, Findings* findings, int cells) {
   const std::string chosen = patient.path("/proc/device-tree/chosen/overlays");
   std::error_code error;
   if (!fs::is_directory(chosen, error)) {
-    findings->skip("device_tree.overlay", "this boot loader does not say which overlays it loaded");
+    findings->push_back(
+        skipped("device_tree.overlay", "this boot loader does not say which overlays it loaded"));
     return;
   }
   const std::string ours = "equipoise-" + patient.board->overlay;
@@ -55,14 +56,12 @@ void examine_loaded(const Patient& patient, Findings* findings, int cells) {
       std::string what = name;
       what.append(" is for \"").append(kind).append("\", this kernel has #pinctrl-cells = <");
       what.append(std::to_string(cells)).append(">: wrong pads were switched, of the eMMC too");
-      findings->fail("device_tree.cells", what, kChoose);
+      findings->push_back(failure("device_tree.cells", what, kChoose));
     }
   }
-  if (found) {
-    findings->ok("device_tree.overlay", ours + " is loaded");
-  } else {
-    findings->warn("device_tree.overlay", "the overlay " + ours + " is not loaded", overlay_fix(patient));
-  }
+  findings->push_back(
+      found ? passed("device_tree.overlay", ours + " is loaded")
+            : warning("device_tree.overlay", "the overlay " + ours + " is not loaded", overlay_fix(patient)));
 }
 
 /// What the next start will load.
@@ -71,15 +70,11 @@ void examine_chosen(const Patient& patient, Findings* findings, int cells) {
   const std::string right = patient.path(file + "-" + std::to_string(cells) + "cell.dtbo");
   std::error_code error;
   if (cells == 0 || !fs::exists(right, error)) return;  // not by our package
-  if (text_of(right) == text_of(patient.path(file + ".dtbo"))) {
-    findings->ok("device_tree.twin",
-                 file + ".dtbo is the one for #pinctrl-cells = <" + std::to_string(cells) + ">");
-  } else {
-    findings->fail(
-        "device_tree.twin",
-        file + ".dtbo is not the one for this kernel's #pinctrl-cells = <" + std::to_string(cells) + ">",
-        kChoose);
-  }
+  const bool twin = text_of(right) == text_of(patient.path(file + ".dtbo"));
+  const std::string cells_of = "#pinctrl-cells = <" + std::to_string(cells) + ">";
+  findings->push_back(twin ? passed("device_tree.twin", file + ".dtbo is the one for " + cells_of)
+                           : failure("device_tree.twin",
+                                     file + ".dtbo is not the one for this kernel's " + cells_of, kChoose));
 }
 
 struct Setting {
@@ -107,13 +102,15 @@ void examine_uenv(const Patient& patient, Findings* findings) {
   for (const Setting& s : kSettings) {
     const bool there = std::find(lines.begin(), lines.end(), s.line) != lines.end();
     if (there != s.off) {
-      findings->ok(s.name, std::string(s.line) + (s.off ? " is not set" : " is set"));
+      findings->push_back(passed(s.name, std::string(s.line) + (s.off ? " is not set" : " is set")));
     } else if (s.off) {
-      findings->fail(s.name, std::string("/boot/uEnv.txt: ") + s.line + ": " + s.what,
-                     std::string("sudo sed -i 's/^") + s.line + "/#&/' /boot/uEnv.txt && sudo reboot");
+      findings->push_back(
+          failure(s.name, std::string("/boot/uEnv.txt: ") + s.line + ": " + s.what,
+                  std::string("sudo sed -i 's/^") + s.line + "/#&/' /boot/uEnv.txt && sudo reboot"));
     } else {
-      findings->fail(s.name, std::string("/boot/uEnv.txt without ") + s.line + ": " + s.what,
-                     std::string("echo ") + s.line + " | sudo tee -a /boot/uEnv.txt && sudo reboot");
+      findings->push_back(
+          failure(s.name, std::string("/boot/uEnv.txt without ") + s.line + ": " + s.what,
+                  std::string("echo ") + s.line + " | sudo tee -a /boot/uEnv.txt && sudo reboot"));
     }
   }
 }

@@ -139,31 +139,24 @@ std::string holder_of(const std::string& chip_path, std::uint32_t line) {
   return info.consumer[0] == '\0' ? "a kernel driver" : info.consumer;
 }
 
-void examine_line(const Patient& patient, Findings* findings, const Line& line) {
+Finding examine_line(const Patient& patient, const Line& line) {
   const std::string name = "gpio." + line.chip + "." + std::to_string(line.line);
   char dir[SYSFS_PATH_MAX];
-  if (sysfs_find(patient.path("/sys/bus/gpio/devices").c_str(), "gpiochip", line.chip.c_str(), dir) < 0) {
-    findings->fail(
+  if (sysfs_find(patient.path("/sys/bus/gpio/devices").c_str(), "gpiochip", line.chip.c_str(), dir) < 0)
+    return failure(
         name, line.use + ": no gpio chip \"" + line.chip + "\"",
         "gpiodetect; ls -l /sys/bus/gpio/devices  # then correct the board file " + patient.board_path);
-    return;
-  }
   const std::string device = patient.path("/dev/" + std::string(std::strrchr(dir, '/') + 1));
-  if (access(device.c_str(), R_OK | W_OK) != 0) {
-    findings->fail(name, line.use + ": " + device + ": " + std::strerror(errno), kGroupFix);
-    return;
-  }
+  if (access(device.c_str(), R_OK | W_OK) != 0)
+    return failure(name, line.use + ": " + device + ": " + std::strerror(errno), kGroupFix);
   const std::string holder = holder_of(device, line.line);
-  if (holder == kSignature) {
-    findings->warn(name, line.use + ": held by a running equipoise", "sudo systemctl stop equipoise");
-  } else if (line.use.rfind("[leds]", 0) == 0 &&
-             access(patient.path("/sys/class/leds/" + holder).c_str(), F_OK) == 0 && !holder.empty()) {
-    findings->ok(name, line.use + ": the kernel's LED " + holder);
-  } else if (!holder.empty()) {
-    findings->fail(name, line.use + ": held by \"" + holder + "\"", overlay_fix(patient));
-  } else {
-    findings->ok(name, line.use + ": free");
-  }
+  if (holder == kSignature)
+    return warning(name, line.use + ": held by a running equipoise", "sudo systemctl stop equipoise");
+  if (line.use.rfind("[leds]", 0) == 0 &&
+      access(patient.path("/sys/class/leds/" + holder).c_str(), F_OK) == 0 && !holder.empty())
+    return passed(name, line.use + ": the kernel's LED " + holder);
+  if (!holder.empty()) return failure(name, line.use + ": held by \"" + holder + "\"", overlay_fix(patient));
+  return passed(name, line.use + ": free");
 }
 
 /// Pad control registers, as pinctrl-single prints them: "pin 18 (PIN18) ... 44e10848 00000006
@@ -213,25 +206,19 @@ std::vector<Use> uses_of(const Board& board) {
   return uses;
 }
 
-void examine_pad(const Patient& patient, Findings* findings, const std::string& use, const Pad& pad,
-                 const std::map<std::uint32_t, std::uint32_t>& pads) {
+Finding examine_pad(const Patient& patient, const std::string& use, const Pad& pad,
+                    const std::map<std::uint32_t, std::uint32_t>& pads) {
   const std::string name = "pinmux." + pad.pin;
   const auto found = pads.find(pad.offset);
-  if (found == pads.end()) {
-    findings->skip(name, use + ": the kernel does not list its pad");
-    return;
-  }
+  if (found == pads.end()) return skipped(name, use + ": the kernel does not list its pad");
   const std::uint32_t mode = found->second & 7U;
   const bool deaf = pad.input && (found->second & kPadReceiver) == 0;
-  if (mode != pad.mode) {
-    findings->fail(
+  if (mode != pad.mode)
+    return failure(
         name, use + ": pad is in mode " + std::to_string(mode) + ", needs mode " + std::to_string(pad.mode),
         overlay_fix(patient));
-  } else if (deaf) {
-    findings->fail(name, use + ": the pad's receiver is off, it reads nothing", overlay_fix(patient));
-  } else {
-    findings->ok(name, use + ": mode " + std::to_string(mode));
-  }
+  if (deaf) return failure(name, use + ": the pad's receiver is off, it reads nothing", overlay_fix(patient));
+  return passed(name, use + ": mode " + std::to_string(mode));
 }
 
 /// Who has claimed each pad: "pin 18 (PIN18): 48302200.pwm (GPIO UNCLAIMED) function ..." or "(MUX
@@ -257,9 +244,10 @@ void examine_owner(const Patient& patient, Findings* findings, const Use& use, c
   if (use.owner.empty() || use.owner.front() == '/') return;
   const std::string name = "owner." + pad.pin;
   if (found == owners.end()) {
-    findings->warn(name, use.use + ": no driver has claimed its pad", overlay_fix(patient));
+    findings->push_back(warning(name, use.use + ": no driver has claimed its pad", overlay_fix(patient)));
   } else if (found->second.find(use.owner) == std::string::npos) {
-    findings->fail(name, use.use + ": its pad belongs to " + found->second, overlay_fix(patient));
+    findings->push_back(
+        failure(name, use.use + ": its pad belongs to " + found->second, overlay_fix(patient)));
   }
 }
 
@@ -267,14 +255,14 @@ void examine_pinmux(const Patient& patient, Findings* findings) {
   const std::string controller = patient.path("/sys/kernel/debug/pinctrl/44e10800.pinmux-pinctrl-single/");
   const auto pads = read_pads(controller + "pins");
   if (pads.empty()) {
-    findings->skip("pinmux", "only root may read what the pins are switched to",
-                   "sudo equipoise doctor --board " + patient.board_path);
+    findings->push_back(skipped("pinmux", "only root may read what the pins are switched to",
+                                "sudo equipoise doctor --board " + patient.board_path));
     return;
   }
   const auto owners = read_owners(controller + "pinmux-pins");
   for (const Use& use : uses_of(*patient.board)) {
     for (const Pad& pad : use.pads) {
-      examine_pad(patient, findings, use.use, pad, pads);
+      findings->push_back(examine_pad(patient, use.use, pad, pads));
       if (!owners.empty()) examine_owner(patient, findings, use, pad, owners);
     }
   }
@@ -283,7 +271,7 @@ void examine_pinmux(const Patient& patient, Findings* findings) {
 }  // namespace
 
 void examine_pins(const Patient& patient, Findings* findings) {
-  for (const Line& line : lines_of(*patient.board)) examine_line(patient, findings, line);
+  for (const Line& line : lines_of(*patient.board)) findings->push_back(examine_line(patient, line));
   examine_pinmux(patient, findings);
 }
 

@@ -44,38 +44,24 @@ bool has_capability(const Patient& patient, int bit) {
 }
 
 /// `needed` or more, or the capability that makes the limit irrelevant.
-void examine_limit(const Patient& patient, Findings* findings, const std::string& name,
-                   const std::string& limit, std::int64_t needed, int capability, const std::string& line) {
+Finding examine_limit(const Patient& patient, const std::string& name, const std::string& limit,
+                      std::int64_t needed, int capability, const std::string& line) {
   const std::int64_t value = soft_limit(patient, limit);
   const std::string text = value < 0 ? "unlimited" : std::to_string(value);
-  if (value < 0 || value >= needed || has_capability(patient, capability)) {
-    findings->ok(name, limit + " " + text + (has_capability(patient, capability) ? " (privileged)" : ""));
-    return;
-  }
+  if (value < 0 || value >= needed || has_capability(patient, capability))
+    return passed(name, limit + " " + text + (has_capability(patient, capability) ? " (privileged)" : ""));
   const std::string what = limit + " is " + text + ", the loop needs " + std::to_string(needed);
   const std::string fix =
       "echo '" + line + "' | sudo tee -a /etc/security/limits.d/equipoise.conf  # then " + "log in again";
-  if (patient.board == nullptr) {
-    findings->warn(name, what + " on a robot", fix);
-  } else {
-    findings->fail(name, what, fix);
-  }
+  if (patient.board == nullptr) return warning(name, what + " on a robot", fix);
+  return failure(name, what, fix);
 }
 
-void examine_limits(const Patient& patient, Findings* findings) {
-  examine_limit(patient, findings, "limits.rtprio", "Max realtime priority", runtime::kGuardPriority,
-                kCapSysNice, "@equipoise - rtprio 99");
-  constexpr std::int64_t kLocked_bytes = 256 << 20;  // code, stacks and the log queue, generously
-  examine_limit(patient, findings, "limits.memlock", "Max locked memory", kLocked_bytes, kCapIpcLock,
-                "@equipoise - memlock unlimited");
-  const std::string idle = patient.path("/dev/cpu_dma_latency");
-  if (patient.board == nullptr) return;
-  if (access(idle.c_str(), R_OK | W_OK) == 0) {
-    findings->ok("limits.cpu_idle", "/dev/cpu_dma_latency may be held");
-  } else {
-    findings->warn("limits.cpu_idle",
-                   "/dev/cpu_dma_latency cannot be opened: wake-ups from deep idle are slow", kGroupFix);
-  }
+Finding examine_idle(const Patient& patient) {
+  if (access(patient.path("/dev/cpu_dma_latency").c_str(), R_OK | W_OK) == 0)
+    return passed("limits.cpu_idle", "/dev/cpu_dma_latency may be held");
+  return warning("limits.cpu_idle", "/dev/cpu_dma_latency cannot be opened: wake-ups from deep idle are slow",
+                 kGroupFix);
 }
 
 /// Any route that takes the telemetry group, the default route included.
@@ -99,32 +85,27 @@ bool has_route(const Patient& patient, std::string* interface) {
   return false;
 }
 
-void examine_route(const Patient& patient, Findings* findings) {
+Finding examine_route(const Patient& patient) {
   std::string interface;
-  if (has_route(patient, &interface)) {
-    findings->ok("lcm.route", std::string(kTelemetryGroup) + " goes out through " + interface);
-  } else {
-    findings->warn("lcm.route",
-                   std::string("no route to ") + kTelemetryGroup + ": no telemetry, only the log",
-                   "sudo ip link set lo up && sudo ip route add 224.0.0.0/4 dev lo");
-  }
+  if (has_route(patient, &interface))
+    return passed("lcm.route", std::string(kTelemetryGroup) + " goes out through " + interface);
+  return warning("lcm.route", std::string("no route to ") + kTelemetryGroup + ": no telemetry, only the log",
+                 "sudo ip link set lo up && sudo ip route add 224.0.0.0/4 dev lo");
 }
 
-void examine_key(const Patient& patient, Findings* findings) {
-  if (patient.key.empty()) {
-    findings->skip("command.key", "no key file given", "equipoise doctor --command-key FILE");
-    return;
-  }
+Finding examine_key(const Patient& patient) {
+  if (patient.key.empty())
+    return skipped("command.key", "no key file given", "equipoise doctor --command-key FILE");
   try {
     runtime::CommandKeys::load(patient.key);
-    findings->ok("command.key", patient.key + " is a key that only its owner reads");
+    return passed("command.key", patient.key + " is a key that only its owner reads");
   } catch (const std::runtime_error& error) {
     namespace fs = std::filesystem;
     std::error_code missing;
     const fs::perms mode = fs::status(patient.key, missing).permissions();
     const bool open_to_others = !missing && fs::exists(patient.key) &&
                                 (mode & (fs::perms::group_all | fs::perms::others_all)) != fs::perms::none;
-    findings->fail("command.key", error.what(),
+    return failure("command.key", error.what(),
                    open_to_others
                        ? "chmod 600 " + patient.key
                        : "equipoise keygen NEWFILE  # and give the same file to those who send commands");
@@ -134,9 +115,14 @@ void examine_key(const Patient& patient, Findings* findings) {
 }  // namespace
 
 void examine_process(const Patient& patient, Findings* findings) {
-  examine_limits(patient, findings);
-  examine_route(patient, findings);
-  examine_key(patient, findings);
+  constexpr std::int64_t kLocked_bytes = 256 << 20;  // code, stacks and the log queue, generously
+  findings->push_back(examine_limit(patient, "limits.rtprio", "Max realtime priority",
+                                    runtime::kGuardPriority, kCapSysNice, "@equipoise - rtprio 99"));
+  findings->push_back(examine_limit(patient, "limits.memlock", "Max locked memory", kLocked_bytes,
+                                    kCapIpcLock, "@equipoise - memlock unlimited"));
+  if (patient.board != nullptr) findings->push_back(examine_idle(patient));
+  findings->push_back(examine_route(patient));
+  findings->push_back(examine_key(patient));
 }
 
 }  // namespace equipoise::app::doctor

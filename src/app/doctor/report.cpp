@@ -86,7 +86,7 @@ std::string threads(const Patient& patient) {
 void write_report(const Patient& patient, const Findings& findings, const std::string& path) {
   const auto title = [](const std::string& name) { return "\n=== " + name + "\n"; };
   std::string text = "equipoise " + version() + "\n" + title("findings");
-  for (const Finding& f : findings.all())
+  for (const Finding& f : findings)
     text += std::string(name_of(f.verdict)) + " " + f.name + ": " + f.what + "\n";
   if (!patient.board_path.empty()) text += title(patient.board_path) + start_of(patient.board_path);
   for (const char* file : kFiles) text += title(file) + start_of(patient.path(file));

@@ -14,15 +14,13 @@ namespace fs = std::filesystem;
 constexpr const char* kSetFix =
     "sudo /usr/lib/equipoise/real-time-machine  # the service does it at every start";
 
-void examine_governor(const Patient& patient, Findings* findings) {
+Finding examine_governor(const Patient& patient) {
   const std::string governor =
       first_line(patient.path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"));
-  if (governor.empty() || governor == "performance") {
-    findings->ok("kernel.cpu_frequency", governor.empty() ? "fixed" : governor);
-  } else {
-    findings->warn("kernel.cpu_frequency",
-                   "governor " + governor + ": the first ticks after a pause run slow", kSetFix);
-  }
+  if (governor.empty() || governor == "performance")
+    return passed("kernel.cpu_frequency", governor.empty() ? "fixed" : governor);
+  return warning("kernel.cpu_frequency", "governor " + governor + ": the first ticks after a pause run slow",
+                 kSetFix);
 }
 
 /// Field 40 of /proc/PID/stat, real-time priority; the name before it may hold spaces.
@@ -44,7 +42,7 @@ bool serves(const std::string& comm, const std::vector<const char*>& devices) {
 }
 
 /// The sample comes through GPIO and I2C2; Ethernet and MMC can wait.
-void examine_irq_threads(const Patient& patient, Findings* findings) {
+Finding examine_irq_threads(const Patient& patient) {
   const std::vector<const char*> ours_on{"4819c00", "44e0700", "4804c00", "481ac00", "481ae00"};
   const std::vector<const char*> others_on{"4a10000", "4806000", "481d800", "4781000"};
   int ours = INT_MAX;
@@ -62,45 +60,41 @@ void examine_irq_threads(const Patient& patient, Findings* findings) {
       lowest = comm;
     }
   }
-  if (ours == INT_MAX) {
-    findings->skip("kernel.irq_threads", "no interrupt threads: only PREEMPT_RT kernels have them");
-  } else if (ours > others) {
-    findings->ok("kernel.irq_threads", "I2C2 and GPIO at " + std::to_string(ours) + ", Ethernet and MMC at " +
-                                           std::to_string(others));
-  } else {
-    findings->warn("kernel.irq_threads",
-                   lowest + " has priority " + std::to_string(ours) + ", Ethernet or MMC " +
-                       std::to_string(others) + ": they delay samples",
-                   kSetFix);
-  }
+  if (ours == INT_MAX)
+    return skipped("kernel.irq_threads", "no interrupt threads: only PREEMPT_RT kernels have them");
+  if (ours > others)
+    return passed("kernel.irq_threads", "I2C2 and GPIO at " + std::to_string(ours) +
+                                            ", Ethernet and MMC at " + std::to_string(others));
+  return warning("kernel.irq_threads",
+                 lowest + " has priority " + std::to_string(ours) + ", Ethernet or MMC " +
+                     std::to_string(others) + ": they delay samples",
+                 kSetFix);
 }
 
 /// The PWM units keep their duty whatever becomes of the kernel; a reset switches their pads back.
-void examine_watchdog(const Patient& patient, Findings* findings) {
+Finding examine_watchdog(const Patient& patient) {
   const std::string dir = patient.path("/sys/class/watchdog/watchdog0");
   const std::string state = first_line(dir + "/state");
-  if (state == "active") {
-    findings->ok("kernel.watchdog",
-                 first_line(dir + "/identity") + ", " + first_line(dir + "/timeout") + " s");
-  } else if (state.empty()) {
-    findings->warn("kernel.watchdog", "no hardware watchdog: a kernel that hangs keeps the motors' last duty",
+  if (state == "active")
+    return passed("kernel.watchdog",
+                  first_line(dir + "/identity") + ", " + first_line(dir + "/timeout") + " s");
+  if (state.empty())
+    return warning("kernel.watchdog", "no hardware watchdog: a kernel that hangs keeps the motors' last duty",
                    "sudo modprobe omap_wdt && echo omap_wdt | sudo tee /etc/modules-load.d/watchdog.conf");
-  } else {
-    findings->warn(
-        "kernel.watchdog",
-        "the hardware watchdog is " + state + ": a kernel that hangs keeps the motors' last duty",
-        "sudo mkdir -p /etc/systemd/system.conf.d && printf '[Manager]\\nRuntimeWatchdogSec=5\\n' | sudo tee "
-        "/etc/systemd/system.conf.d/equipoise.conf && sudo systemctl daemon-reexec");
-  }
+  return warning(
+      "kernel.watchdog",
+      "the hardware watchdog is " + state + ": a kernel that hangs keeps the motors' last duty",
+      "sudo mkdir -p /etc/systemd/system.conf.d && printf '[Manager]\\nRuntimeWatchdogSec=5\\n' | sudo tee "
+      "/etc/systemd/system.conf.d/equipoise.conf && sudo systemctl daemon-reexec");
 }
 
 }  // namespace
 
 void examine_schedule(const Patient& patient, Findings* findings) {
   if (patient.board == nullptr) return;
-  examine_governor(patient, findings);
-  examine_irq_threads(patient, findings);
-  examine_watchdog(patient, findings);
+  findings->push_back(examine_governor(patient));
+  findings->push_back(examine_irq_threads(patient));
+  findings->push_back(examine_watchdog(patient));
 }
 
 }  // namespace equipoise::app::doctor
