@@ -149,4 +149,4 @@ def test_an_unknown_choice_is_refused(root):
     command = [root / "build/host/equipoise", "design", "--config", root / "config/mbbr.toml"]
     run = subprocess.run([*command, "--controller", "slc"], capture_output=True, text=True, check=False)
     assert run.returncode == 2
-    assert "scheduled, thesis" in run.stderr
+    assert "thesis, scheduled" in run.stderr
