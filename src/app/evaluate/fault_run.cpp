@@ -23,9 +23,6 @@ class FaultJudge {
  public:
   FaultJudge(const FaultPlan& plan, double max_tilt_rad) : plan_(plan), max_tilt_rad_(max_tilt_rad) {}
 
-  /// The fault strikes before the next tick.
-  void strike() { struck_while_on_ = was_on_; }
-
   /// `active`: the fault lasts.
   void judge(std::int64_t tick, const runtime::TickRecord& t, bool active, const StateView& truth) {
     const FaultInfo& info = kFaults[static_cast<std::size_t>(plan_.fault)];
@@ -44,8 +41,8 @@ class FaultJudge {
     wrong_ = on && !(error < kWrongTilt_rad) ? wrong_ + 1 : 0;
     if (lying_ > kDeadlineTicks) unsafe("motors on after a fall");
     if (wrong_ > kDeadlineTicks) unsafe("wrong tilt unnoticed");
-    const bool must_be_off = info.deadline_ticks > 0 && (struck_while_on_ || !info.once);
-    if (on && active && must_be_off && since >= info.deadline_ticks) unsafe("duty after the deadline");
+    if (on && active && info.deadline_ticks > 0 && since >= info.deadline_ticks)
+      unsafe("duty after the deadline");
     if (on && outcome_.disarmed) unsafe("armed again by itself");
     if (on && !t.arm) unsafe("motors on unasked");
     if (!on && t.reasons == 0) unsafe("motors off without a reason");
@@ -93,7 +90,6 @@ class FaultJudge {
   double max_tilt_rad_;
   FaultOutcome outcome_;
   bool was_on_ = false;
-  bool struck_while_on_ = false;
   int lying_ = 0;
   int wrong_ = 0;
   Vec2 position_W_m_ = Vec2::Zero();
@@ -135,7 +131,6 @@ FaultOutcome run_with_fault(World& world, Firmware& firmware, const FaultPlan& p
     if (tick + 1 == plan.fault_at_tick) {
       const int lasts = kFaults[static_cast<std::size_t>(plan.fault)].ticks;
       faulty.start(plan.fault, lasts > 0 ? lasts : plan.fault_ticks);
-      judge.strike();
     }
     done = tick + 1 >= plan.end_tick;
   };

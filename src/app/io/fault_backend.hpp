@@ -15,55 +15,55 @@
 namespace equipoise::app {
 
 /// A row per fault: its kind, and FaultInfo.
-#define EQUIPOISE_FAULTS(F)                                                                      \
-  F(kImuOff, "imu_off", kBlindTicks, "no sample")                                                \
-  F(kImuGap, "imu_gap_100ms", 0, "no IMU sample for 100 ms", false, 20)                          \
-  F(kAllGap, "all_gap_30ms", 0, "no sample at all for 30 ms", false, 6)                          \
-  F(kImuStuck, "imu_stuck", 3 + kBlindTicks, "same numbers; three alike are needed to tell")     \
-  F(kBadSamples, "bad_samples", 0, "one IMU sample of ten is garbage, for a second", false, 200) \
-  F(kNoiseBurst, "noise_burst", 0, "20 deg/s and 0.5 g of noise")                                \
-  F(kNotANumber, "not_a_number", kBlindTicks, "in the gyro")                                     \
-  F(kBiasJump, "bias_jump", 0, "0.2 rad/s on the gyro")                                          \
-  F(kDelayed, "delayed", 0, "samples three ticks old")                                           \
-  F(kDuplicated, "duplicated", kBlindTicks, "one sample again and again")                        \
-  F(kHalfRate, "half_rate", 0, "each IMU sample comes twice")                                    \
-  F(kTornPacket, "torn_packet", 0, "attitude packet refused")                                    \
-  F(kFifoOverflow, "fifo_overflow", 0, "attitude packets lost")                                  \
-  F(kNack, "nack", kBlindTicks, "IMU does not answer")                                           \
-  F(kBusHang, "bus_hang", kBlindTicks, "the read takes 60 ms and fails")                         \
-  F(kLostInterrupt, "lost_interrupt", kBlindTicks, "ticks by deadline, no samples")              \
-  F(kGyroXFrozen, "gyro_x_frozen", 0, "repeats its last count")                                  \
-  F(kGyroYFrozen, "gyro_y_frozen", 0, "repeats its last count")                                  \
-  F(kGyroZFrozen, "gyro_z_frozen", 0, "repeats its last count")                                  \
-  F(kGyroXZero, "gyro_x_zero", 0, "reads zero")                                                  \
-  F(kGyroYZero, "gyro_y_zero", 0, "reads zero")                                                  \
-  F(kGyroZZero, "gyro_z_zero", 0, "reads zero")                                                  \
-  F(kGyroXFlipped, "gyro_x_flipped", 0, "reads minus the rate")                                  \
-  F(kGyroYFlipped, "gyro_y_flipped", 0, "reads minus the rate")                                  \
-  F(kGyroZFlipped, "gyro_z_flipped", 0, "reads minus the rate")                                  \
-  F(kGyroXYSwapped, "gyro_xy_swapped", 0, "each reads the other's rate")                         \
-  F(kGyroYZSwapped, "gyro_yz_swapped", 0, "each reads the other's rate")                         \
-  F(kGyroZXSwapped, "gyro_zx_swapped", 0, "each reads the other's rate")                         \
-  F(kGyroRamp, "gyro_ramp", 0, "bias grows by 0.2 rad/s a second")                               \
-  F(kAccelFrozen, "accel_frozen", 0, "accelerometer repeats its last counts")                    \
-  F(kEncoderReversal, "encoder_reversal", 0, "one encoder counts backwards")                     \
-  F(kCountJump, "count_jump", 0, "500 counts at once", true)                                     \
-  F(kWheelLoss, "wheel_loss", 0, "one encoder stands still")                                     \
-  F(kEncoderDead, "encoder_dead", 0, "one encoder reads zero")                                   \
-  F(kTwoEncodersDead, "two_encoders_dead", 0, "two encoders stand still")                        \
-  F(kEncoderErrors, "encoder_errors", 0, "three reads of ten fail, for a second", false, 200)    \
-  F(kBatterySag, "battery_sag", 5, "5 V")                                                        \
-  F(kBatteryFlicker, "battery_flicker", 0, "three readings of ten are zero")                     \
-  F(kAdcOpen, "adc_open", 5, "reads zero")                                                       \
-  F(kClockJump, "clock_jump", 0, "time stamps jump by 1 s, once")                                \
-  F(kStall1ms, "stall_1ms", 0, "below a tick")                                                   \
-  F(kStall20ms, "stall_20ms", 0, "the loop wakes late", true)                                    \
-  F(kStall50ms, "stall_50ms", 0, "the loop wakes late", true)                                    \
-  F(kWriteError, "write_error", 2, "motor writes fail")                                          \
-  F(kMotorDead, "motor_dead", 0, "one motor does not turn")                                      \
-  F(kMotorsSwapped, "motors_swapped", 0, "each does what the other is told")                     \
-  F(kMotorStuck, "motor_stuck", 0, "one bridge keeps 0.6 duty")                                  \
-  F(kRemoteLost, "remote_lost", 0, "commands get old: CAN bus-off, remote gone")                 \
+#define EQUIPOISE_FAULTS(F)                                                                  \
+  F(kImuOff, "imu_off", kBlindTicks, "no sample")                                            \
+  F(kImuGap, "imu_gap_100ms", 0, "no IMU sample for 100 ms", 20)                             \
+  F(kAllGap, "all_gap_30ms", 0, "no sample at all for 30 ms", 6)                             \
+  F(kImuStuck, "imu_stuck", 3 + kBlindTicks, "same numbers; three alike are needed to tell") \
+  F(kBadSamples, "bad_samples", 0, "one IMU sample of ten is garbage, for a second", 200)    \
+  F(kNoiseBurst, "noise_burst", 0, "20 deg/s and 0.5 g of noise")                            \
+  F(kNotANumber, "not_a_number", kBlindTicks, "in the gyro")                                 \
+  F(kBiasJump, "bias_jump", 0, "0.2 rad/s on the gyro")                                      \
+  F(kDelayed, "delayed", 0, "samples three ticks old")                                       \
+  F(kDuplicated, "duplicated", kBlindTicks, "one sample again and again")                    \
+  F(kHalfRate, "half_rate", 0, "each IMU sample comes twice")                                \
+  F(kTornPacket, "torn_packet", 0, "attitude packet refused")                                \
+  F(kFifoOverflow, "fifo_overflow", 0, "attitude packets lost")                              \
+  F(kNack, "nack", kBlindTicks, "IMU does not answer")                                       \
+  F(kBusHang, "bus_hang", kBlindTicks, "the read takes 60 ms and fails")                     \
+  F(kLostInterrupt, "lost_interrupt", kBlindTicks, "ticks by deadline, no samples")          \
+  F(kGyroXFrozen, "gyro_x_frozen", 0, "repeats its last count")                              \
+  F(kGyroYFrozen, "gyro_y_frozen", 0, "repeats its last count")                              \
+  F(kGyroZFrozen, "gyro_z_frozen", 0, "repeats its last count")                              \
+  F(kGyroXZero, "gyro_x_zero", 0, "reads zero")                                              \
+  F(kGyroYZero, "gyro_y_zero", 0, "reads zero")                                              \
+  F(kGyroZZero, "gyro_z_zero", 0, "reads zero")                                              \
+  F(kGyroXFlipped, "gyro_x_flipped", 0, "reads minus the rate")                              \
+  F(kGyroYFlipped, "gyro_y_flipped", 0, "reads minus the rate")                              \
+  F(kGyroZFlipped, "gyro_z_flipped", 0, "reads minus the rate")                              \
+  F(kGyroXYSwapped, "gyro_xy_swapped", 0, "each reads the other's rate")                     \
+  F(kGyroYZSwapped, "gyro_yz_swapped", 0, "each reads the other's rate")                     \
+  F(kGyroZXSwapped, "gyro_zx_swapped", 0, "each reads the other's rate")                     \
+  F(kGyroRamp, "gyro_ramp", 0, "bias grows by 0.2 rad/s a second")                           \
+  F(kAccelFrozen, "accel_frozen", 0, "accelerometer repeats its last counts")                \
+  F(kEncoderReversal, "encoder_reversal", 0, "one encoder counts backwards")                 \
+  F(kCountJump, "count_jump", 0, "500 counts at once")                                       \
+  F(kWheelLoss, "wheel_loss", 0, "one encoder stands still")                                 \
+  F(kEncoderDead, "encoder_dead", 0, "one encoder reads zero")                               \
+  F(kTwoEncodersDead, "two_encoders_dead", 0, "two encoders stand still")                    \
+  F(kEncoderErrors, "encoder_errors", 0, "three reads of ten fail, for a second", 200)       \
+  F(kBatterySag, "battery_sag", 5, "5 V")                                                    \
+  F(kBatteryFlicker, "battery_flicker", 0, "three readings of ten are zero")                 \
+  F(kAdcOpen, "adc_open", 5, "reads zero")                                                   \
+  F(kClockJump, "clock_jump", 0, "time stamps jump by 1 s, once")                            \
+  F(kStall1ms, "stall_1ms", 0, "below a tick")                                               \
+  F(kStall20ms, "stall_20ms", 0, "the loop wakes late")                                      \
+  F(kStall50ms, "stall_50ms", 0, "the loop wakes late")                                      \
+  F(kWriteError, "write_error", 2, "motor writes fail")                                      \
+  F(kMotorDead, "motor_dead", 0, "one motor does not turn")                                  \
+  F(kMotorsSwapped, "motors_swapped", 0, "each does what the other is told")                 \
+  F(kMotorStuck, "motor_stuck", 0, "one bridge keeps 0.6 duty")                              \
+  F(kRemoteLost, "remote_lost", 0, "commands get old: CAN bus-off, remote gone")             \
   F(kLogFull, "log_full", 2, "the log cannot be written")
 
 #define EQUIPOISE_KIND(kind, ...) kind,
@@ -75,8 +75,7 @@ struct FaultInfo {
   /// Ticks from the fault until the motors must be off; 0: may be tolerated while the state stays right.
   int deadline_ticks;
   const char* why;
-  bool once = false;  // strikes in its first tick only: what comes after is usable again
-  int ticks = 0;      // how long it lasts; 0: to the end
+  int ticks = 0;  // how long it lasts; 0: to the end
 };
 
 inline constexpr int kDeadlineTicks = 3;  // after the fault makes the data unusable
