@@ -13,7 +13,7 @@ namespace equipoise {
 template <int N>
 Vec<N> within(const Vec<N>& first, const Vec<N>& second, double limit) noexcept {
   const double largest = first.cwiseAbs().maxCoeff();
-  if (!(largest < limit)) return largest > 0.0 ? Vec<N>(first * (limit / largest)) : first;
+  if (!(largest <= limit)) return first * (limit / largest);
   double share = 1.0;
   for (int i = 0; i < N; ++i) {
     const double sum = first(i) + second(i);

@@ -201,6 +201,8 @@ TEST(Allocate, SharesWithinTheLimitWhateverTheSigns) {
     }
   }
   EXPECT_EQ(within<2>(Vec2(0.8, -0.4), Vec2(0.1, 0.1), limit), Vec2(0.8, -0.4)) << "no room left";
+  EXPECT_EQ(within<2>(Vec2(0.8, -0.4), Vec2(-0.1, 0.1), limit), Vec2(0.8 - 0.1, -0.4 + 0.1))
+      << "room the other way";
   const Vec2 shrunk = within<2>(Vec2(0.9, -0.3), Vec2(0.1, 0.1), 0.6);
   EXPECT_LT((shrunk - Vec2(0.6, -0.2)).norm(), 1e-12) << "below full duty, too";
   EXPECT_EQ(within<2>(Vec2::Zero(), Vec2::Zero(), 0.0), Vec2::Zero());
