@@ -236,7 +236,7 @@ TEST(FaultBackend, AStallTakesTicksAndTheGuardCutsUntilTheLoopLetsGo) {
     const rio_sensors_t s = b.next();
     EXPECT_EQ(b.robot.ticks - kBefore, row.ticks);
     EXPECT_EQ(b.now_ns, b.robot.ticks * 5'000'000LL + (row.cuts ? 0 : 1'000'000));
-    EXPECT_EQ(s.health, row.kind == FaultKind::kBusHang ? RIO_IMU_BUS_ERROR : 0U);
+    EXPECT_EQ(s.health == RIO_IMU_BUS_ERROR, row.kind == FaultKind::kBusHang);
     EXPECT_EQ(b.robot.offs, row.cuts ? 1 : 0);
     EXPECT_EQ(b.write({0.5, 0.25}), 0);
     EXPECT_EQ(b.robot.told.duty[0], row.cuts ? 0.0 : 0.5) << "the guard holds them";

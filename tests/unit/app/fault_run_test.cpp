@@ -203,10 +203,10 @@ TEST(FaultJudge, ATickWithoutDutyIsNoDisarming) {
 
 TEST(FaultJudge, AFaultIsFoundByADetectorNotByAGap) {
   const FaultOutcome out = run(plan_of(FaultKind::kRemoteLost), [](int n, auto& t, auto&) {
-    t.degraded = n < kFault       ? kWithoutWheelTwo
-                 : n < kFault + 5 ? kWithoutImu
-                 : n < kFault + 9 ? kGyroBiasJumped
-                                  : 0;
+    t.degraded = 0;
+    if (n < kFault) t.degraded = kWithoutWheelTwo;
+    if (in(n, kFault, kFault + 5)) t.degraded = kWithoutImu;
+    if (in(n, kFault + 5, kFault + 9)) t.degraded = kGyroBiasJumped;
   });
   EXPECT_EQ(out.found_after_ticks, 6);
   EXPECT_EQ(out.degraded, kWithoutImu | kGyroBiasJumped);
