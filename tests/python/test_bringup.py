@@ -109,6 +109,10 @@ def test_bringup_writes_a_board_file_that_fits_and_run_reads_its_calibration(roo
     ended = on_stand(root, "bringup", "--out", board, *faults)
     assert ended.returncode == 0, ended.stderr
     assert "motor 1 turns wheel 3" in json.loads(ended.stdout)["corrected"]
+    said = ended.stderr
+    for text in ("2 of 4", "3 of 4", "motor 2: moves at 16 % torque, encoder 2 counts down", "4 of 4: again"):
+        assert text in said
+    assert said.count("  motor 3: ") == 2 and f"written to {board}" in said
     calibration = tmp_path / "robot-calibration.toml"
     assert values(calibration, "bias_rad_s")
     # Whoever reads the board file reads the calibration beside it, strictly.

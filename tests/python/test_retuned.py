@@ -3,8 +3,10 @@
 import json
 import math
 import re
+import tomllib
 
 import pytest
+from equipoise_robot import Log
 from test_blackbox import equipoise_run, replay, simulate
 
 
@@ -17,9 +19,14 @@ def test_the_same_tuning_beside_a_run_does_what_the_run_did(root, tmp_path, robo
     assert beside["changed"] == beside["recorded"] and beside["not_armed_ticks"] == 0
     assert beside["changed"]["duty_rms"] > 0 and beside["changed"]["normalized_innovation_mean"] > 0
     assert beside["difference"]["attitude_rmse_rad"] == 0 and beside["difference"]["ticks"] == 601
-    weaker = replay(root, log, "--set", f"friction.compensation={float(was) / 2}")[1]["retuned"]
+    other = tmp_path / "other.lcm"
+    weaker = replay(root, log, "--set", f"friction.compensation={float(was) / 2}", "--log", other)[1]["retuned"]
     assert weaker["changed"]["duty_rms"] < beside["recorded"]["duty_rms"]
     assert weaker["difference"]["attitude_rmse_rad"] == 0  # the filter gets what the run did to the motors
+    told, ours = Log(other), Log(log)
+    assert told.run.backend == "replay" and told.run.robot == ours.run.robot
+    assert tomllib.loads(told.run.config_toml)["friction"]["compensation"] == float(was) / 2
+    assert len(told.sensors()) == len(ours.sensors())
 
 
 @pytest.mark.parametrize(
