@@ -20,7 +20,9 @@ def test_the_same_tuning_beside_a_run_does_what_the_run_did(root, tmp_path, robo
     assert beside["changed"]["duty_rms"] > 0 and beside["changed"]["normalized_innovation_mean"] > 0
     assert beside["difference"]["attitude_rmse_rad"] == 0 and beside["difference"]["ticks"] == 601
     other = tmp_path / "other.lcm"
-    weaker = replay(root, log, "--set", f"friction.compensation={float(was) / 2}", "--log", other)[1]["retuned"]
+    weaker = replay(root, log, "--set", f"friction.compensation={float(was) / 2}", "--log", other)[1][
+        "retuned"
+    ]
     assert weaker["changed"]["duty_rms"] < beside["recorded"]["duty_rms"]
     assert weaker["difference"]["attitude_rmse_rad"] == 0  # the filter gets what the run did to the motors
     told, ours = Log(other), Log(log)
