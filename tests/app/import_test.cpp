@@ -9,8 +9,9 @@
 #include <fstream>
 #include <map>
 
-#include "app/import/checks.hpp"
 #include "app/text/errors.hpp"
+#include "equipoise/actuate/safety.hpp"
+#include "support/foreign_table.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -189,35 +190,6 @@ TEST(ImportMap, RefusesWhatContradictsItself) {
   EXPECT_THAT(map_refusal("more", "[more]\nx = 1\n"), HasSubstr("more"));
 }
 
-// A table by hand: 1 kHz, the gyro counts up, both wheels turn at 1 rad/s, 6 V on the first wheel from 20 ms
-// on.
-struct Foreign {
-  ImportedRobot robot = imported_robot(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml");
-  ImportMap map;
-  Table table;
-
-  Foreign() {
-    robot.calibration.R_BS.setIdentity();
-    table.names = {"t", "g", "zero", "up", "w", "v"};
-    table.columns.resize(6);
-    for (int k = 0; k < 100; ++k) {
-      const double row[6] = {1e-3 * k, 0.01 * k, 0.0, 9.8, 1e-3 * k, k >= 20 ? 6.0 : 0.0};
-      for (std::size_t i = 0; i < 6; ++i) table.columns[i].push_back(row[i]);
-    }
-    map.time = {"t", 1.0};
-    map.gyro.axes = {{"g", 1.0}, {"zero", 1.0}, {"zero", 1.0}};
-    map.accel.axes = {{"zero", 1.0}, {"zero", 1.0}, {"up", 1.0}};
-    map.wheels.axes = {{"w", 1.0}, {"w", 1.0}};
-    map.wheels.kind = "angle";
-    map.drive.axes = {{"v", 1.0}, {"zero", 1.0}};
-    map.drive.kind = "volts";
-    map.battery_V = 7.4;
-  }
-  std::vector<runtime::TickRecord> ticks() const {
-    return imported_ticks(imported_rows(table, map, robot), map, robot);
-  }
-};
-
 TEST(Import, GivesEachTickTheNewestSampleInTheRobotsCounts) {
   const Foreign f;
   const auto ticks = f.ticks();
@@ -275,55 +247,150 @@ TEST(Import, TorqueIsTheVoltageThatMakesItAtThisSpeed) {
               1e-9);  // against the back-EMF
 }
 
-Check check_of(const Foreign& f, const std::string& name) {
-  for (const Check& c : check_import(f.table, imported_rows(f.table, f.map, f.robot), f.map, f.robot))
-    if (c.name == name) return c;
-  return {};
+TEST(Import, TimeIsAColumnStepsOrARate) {
+  const auto times = [](const std::function<void(Foreign&)>& change) {
+    Foreign f;
+    change(f);
+    return imported_rows(f.table, f.map, f.robot);
+  };
+  const ImportedRows column = times([](Foreign& f) { f.map.from_s = 0.01, f.map.to_s = 0.02; });
+  EXPECT_EQ(column.t_s.size(), 11U) << "both ends are in it";
+  EXPECT_DOUBLE_EQ(column.t_s.front(), 0.01);
+  EXPECT_DOUBLE_EQ(column.gyro_rad_s.front().x(), 0.1) << "the row's own values";
+  const ImportedRows steps = times([](Foreign& f) {
+    f.map.time_is_step = true;
+    for (double& t : f.table.columns[0]) t = 0.002;
+  });
+  EXPECT_EQ(steps.t_s.front(), 0.0);
+  EXPECT_NEAR(steps.t_s.back(), 99 * 0.002, 1e-12);
+  const ImportedRows rate = times([](Foreign& f) { f.map.time.name.clear(), f.map.rate_hz = 50.0; });
+  EXPECT_DOUBLE_EQ(rate.t_s[3], 0.06);
+  const ImportedRows back = times([](Foreign& f) { f.table.columns[0][7] = f.table.columns[0][6]; });
+  EXPECT_EQ(back.not_advancing, 1U);
+  EXPECT_EQ(back.t_s.size(), 99U);
+  EXPECT_DOUBLE_EQ(back.t_s[7], 0.008);
 }
 
-TEST(ImportChecks, NameGapsRepeatsJumpsClippingAndUnits) {
-  Foreign f;
-  EXPECT_EQ(check_of(f, "gaps").ok, true);
-  EXPECT_EQ(check_of(f, "repeats").ok, true);
-  EXPECT_EQ(check_of(f, "wheel_jumps").ok, true);
-  EXPECT_EQ(check_of(f, "accel_norm").ok, true);
-  Foreign bad;
-  for (auto& column : bad.table.columns) column.erase(column.begin() + 40, column.begin() + 55);
-  EXPECT_EQ(check_of(bad, "gaps").ok, false);
-  for (std::size_t k = 60; k < 70; ++k) bad.table.columns[1][k] = bad.table.columns[1][60];
-  EXPECT_EQ(check_of(bad, "repeats").ok, false);
-  bad.table.columns[4][30] += 1.0;
-  EXPECT_EQ(check_of(bad, "wheel_jumps").ok, false);
-  bad.map.gyro.range = 0.5;
-  EXPECT_EQ(check_of(bad, "gyro_clipping").ok, false);
-  for (double& up : bad.table.columns[3]) up /= 9.8;
-  EXPECT_THAT(check_of(bad, "accel_norm").text, HasSubstr("accel.unit is g, not m/s2"));
-  for (double& t : bad.table.columns[0]) t *= 1e3;
-  EXPECT_THAT(check_of(bad, "clock").text, HasSubstr("ms or us"));
-  bad.table.columns[0][20] = bad.table.columns[0][10];
-  EXPECT_THAT(check_of(bad, "clock").text, HasSubstr("does not advance"));
+TEST(Import, RefusesWhatTheTableOrTheRobotHasNot) {
+  const auto why = [](const std::function<void(Foreign&)>& change) -> std::string {
+    Foreign f;
+    change(f);
+    try {
+      (void)imported_rows(f.table, f.map, f.robot);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(why([](Foreign& f) { f.map.gyro.axes[1].name = "q"; }),
+              HasSubstr("no column \"q\", which the map names; it has t, g, zero, up, w, v"));
+  EXPECT_THAT(why([](Foreign& f) { f.map.wheels.axes.pop_back(); }),
+              HasSubstr("wheels.axes of the map names 1 columns"));
+  EXPECT_THAT(why([](Foreign& f) { f.map.drive.axes.push_back({"v", 1.0}); }), HasSubstr("has 2 wheels"));
+  EXPECT_THAT(why([](Foreign& f) {
+                f.map.tilt.axes = {{"g", 1.0}, {"g", 1.0}};
+              }),
+              HasSubstr("balances about 1"));
+  EXPECT_EQ(why([](Foreign& f) { f.map.tilt.axes = {{"g", 1.0}}; }), "");
+  EXPECT_THAT(why([](Foreign& f) { f.map.from_s = f.map.to_s = 0.05; }), HasSubstr("fewer than two rows"));
+  EXPECT_EQ(why([](Foreign& f) { f.map.from_s = 0.0495, f.map.to_s = 0.0515; }), "");
+  EXPECT_EQ(why([](Foreign& f) { f.table.columns[0].back() = 7200.0; }), "");
+  EXPECT_THAT(why([](Foreign& f) { f.table.columns[0].back() = 7200.1; }),
+              HasSubstr("two hours are the most"));
+  EXPECT_THAT(why([](Foreign& f) {
+                for (auto& c : f.table.columns) c.clear();
+              }),
+              HasSubstr("no row of numbers"));
 }
 
-/// Before and after the stretches that balance the robot may lie on its head.
-TEST(ImportChecks, OnlyWhatBalancesIsHeldAgainstAMap) {
+TEST(Import, ADriveIsAShareOfTheNominalVoltage) {
   Foreign f;
-  for (auto& column : f.table.columns) {
-    std::vector<double> longer;
-    for (int i = 0; i < 30; ++i) longer.insert(longer.end(), column.begin(), column.end());
-    column = longer;
+  f.map.battery = {"up", 1.0};  // 9.8 V
+  f.map.drive.kind = "duty";
+  f.map.drive.axes[0].factor = 0.1;
+  const double nominal_V = f.robot.motor.nominal_V;
+  const ImportedRows duty = imported_rows(f.table, f.map, f.robot);
+  EXPECT_NEAR(duty.drive[50][0], 0.6 * 9.8 / nominal_V, 1e-12);
+  EXPECT_EQ(duty.drive[19][0], 0.0);
+  EXPECT_EQ(duty.battery_V[50], 9.8);
+  f.map.drive.kind = "volts";
+  EXPECT_NEAR(imported_rows(f.table, f.map, f.robot).drive[50][0], 0.6 / nominal_V, 1e-12);
+  f.map.drive.kind = "torque";
+  const MotorParameters& m = f.robot.motor;
+  EXPECT_NEAR(imported_rows(f.table, f.map, f.robot).drive[50][0], (0.6 + m.k2()) / m.k1(), 1e-6);
+}
+
+TEST(Import, RatesAreSummedAndValuesRoundedToTheirQuantum) {
+  Foreign f;
+  f.map.wheels.kind = "rate";
+  f.map.wheels.axes = {{"v", 1.0}, {"up", 1.0}};
+  f.map.gyro.quantum = 0.04;
+  f.table.columns[5][30] = NAN;  // is not summed
+  const ImportedRows rows = imported_rows(f.table, f.map, f.robot);
+  EXPECT_EQ(rows.wheel_rad[19][0], 0.0);
+  EXPECT_NEAR(rows.wheel_rad[29][0], 6.0 * 0.010, 1e-12);
+  EXPECT_NEAR(rows.wheel_rad[31][0], 6.0 * 0.011, 1e-12);
+  EXPECT_NEAR(rows.wheel_rad[1][1], 9.8e-3, 1e-12);
+  EXPECT_NEAR(rows.gyro_rad_s[5].x(), 0.04, 1e-12);
+  EXPECT_NEAR(rows.gyro_rad_s[7].x(), 0.08, 1e-12);
+}
+
+TEST(Import, TicksAreThoseOfARunThatSomebodyElseDrove) {
+  Foreign f;
+  f.map.balancing = {{0.02, 0.03}, {0.05, 0.05}};
+  f.map.tilt.axes = {{"g", 2.0}};
+  const auto ticks = f.ticks();
+  for (const auto& t : ticks) {
+    const bool on = (t.tick >= 4 && t.tick <= 6) || t.tick == 10;
+    EXPECT_EQ(t.arm, on) << t.tick;
+    EXPECT_EQ(t.motors.enable, on) << t.tick;
+    EXPECT_EQ(t.arm_state, static_cast<std::int32_t>(on ? ArmState::kArmed : ArmState::kDisarmed)) << t.tick;
+    EXPECT_NEAR(t.estimate.theta_rad[0], 0.02 * 5.0 * static_cast<double>(t.tick), 1e-12);
+    EXPECT_EQ(t.battery_V, 7.4);
+    EXPECT_EQ(t.motor_count, 2);
+    EXPECT_EQ(t.u_lin, t.u_friction);
   }
-  for (std::size_t k = 0; k < 3000; ++k) {
-    f.table.columns[0][k] = 1e-3 * static_cast<double>(k);
-    f.table.columns[4][k] = 1e-3 * static_cast<double>(k);
-    f.table.columns[3][k] = k >= 1100 && k < 1900 ? 9.8 : -9.8;
-  }
-  f.map.balancing = {{0.89, 1.9}};  // 0.2 s of it are for the start
-  EXPECT_EQ(check_of(f, "accel_up").ok, true);
-  f.map.balancing = {{1.2, 2.9}};
-  EXPECT_EQ(check_of(f, "accel_up").ok, false);
-  EXPECT_THAT(check_of(f, "accel_up").text, HasSubstr("accel z is flipped"));
-  f.map.balancing.clear();
-  EXPECT_EQ(check_of(f, "accel_up").ok, false) << "all of the table";
+  const double sign = f.robot.calibration.motor_sign[0];
+  EXPECT_NEAR(ticks[5].motors.duty[0], sign * 6.0 / 7.4, 1e-12);
+  EXPECT_EQ(ticks[5].motors.duty[1], 0.0);
+  const Calibration& c = f.robot.calibration;
+  EXPECT_NEAR(ticks[5].raw.battery_counts, (7.4 - c.battery_offset_V) / c.battery_V_per_count, 1e-9);
+  f.map.battery_V = NAN;
+  f.table.columns[4][10] = NAN;
+  EXPECT_EQ(f.ticks()[2].raw.valid, static_cast<unsigned>(RIO_IMU));
+  f.table.columns[1][10] = NAN;
+  EXPECT_EQ(f.ticks()[2].raw.valid, 0U);
+}
+
+TEST(Import, OfABenchIsOneMotor) {
+  Foreign f;
+  f.map.current.axes = {{"g", 1.0}, {"up", -1.0}};
+  const auto samples = imported_bench(f.table, f.map, 1);
+  ASSERT_EQ(samples.size(), 100U);
+  EXPECT_DOUBLE_EQ(samples[50].t_s, 0.05);
+  EXPECT_EQ(samples[50].u, 0.0);
+  EXPECT_EQ(samples[50].current_A, -9.8);
+  EXPECT_EQ(samples[50].angle_rad, 0.05);
+  EXPECT_NEAR(imported_bench(f.table, f.map, 0)[50].u, 6.0 / 7.4, 1e-12);
+  f.map.battery = {"up", 1.0};
+  f.map.drive.kind = "duty";
+  EXPECT_NEAR(imported_bench(f.table, f.map, 0)[50].u, 6.0, 1e-12);
+  EXPECT_EQ(imported_bench(f.table, f.map, 0)[50].supply_V, 9.8);
+  f.map.wheels.kind = "rate";
+  EXPECT_NEAR(imported_bench(f.table, f.map, 0)[2].angle_rad, 3e-6, 1e-12);
+  const auto why = [&f](std::size_t motor) -> std::string {
+    try {
+      (void)imported_bench(f.table, f.map, motor);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(why(2), HasSubstr("there is no motor 3"));
+  f.map.current.axes.pop_back();
+  EXPECT_THAT(why(1), HasSubstr("current.axes of the map names 1 columns"));
+  f.map.drive.kind = "torque";
+  EXPECT_THAT(why(0), HasSubstr("volts or duty"));
 }
 
 }  // namespace
