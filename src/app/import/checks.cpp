@@ -24,14 +24,15 @@ constexpr double kRightOfForce = 5.0;  // what the specific force says of small 
 
 /// The rows on a grid of ticks, between them by a line.
 struct Grid {
-  Series gyro[3], accel[3], roll[2], drive_roll[2], yaw, wheel_half_difference, drive_half_difference;
-  Series wheel[kMaxMotors];
-  std::vector<bool> used;
+  Eigen::Index size;
+  Eigen::ArrayXXd gyro{size, 3}, accel{size, 3}, roll{size, 2}, drive_roll{size, 2}, wheel{size, kMaxMotors};
+  Series yaw{size}, wheel_half_difference{size}, drive_half_difference{size};
+  std::vector<Eigen::Index> used;  // ticks that count
 
-  Grid(const ImportedRows& rows, const ImportMap& map, const ImportedRobot& robot) {
-    const auto size = static_cast<std::size_t>((rows.t_s.back() - rows.t_s.front()) / kTickS) + 1;
+  Grid(const ImportedRows& rows, const ImportMap& map, const ImportedRobot& robot)
+      : size(static_cast<Eigen::Index>((rows.t_s.back() - rows.t_s.front()) / kTickS) + 1) {
     std::size_t k = 0;
-    for (std::size_t n = 0; n < size; ++n) {
+    for (Eigen::Index n = 0; n < size; ++n) {
       const double t = rows.t_s.front() + static_cast<double>(n) * kTickS;
       while (k + 2 < rows.t_s.size() && rows.t_s[k + 1] < t) ++k;
       const double s = std::clamp((t - rows.t_s[k]) / (rows.t_s[k + 1] - rows.t_s[k]), 0.0, 1.0);
@@ -39,49 +40,36 @@ struct Grid {
       const Mat3& R_BS = robot.calibration.R_BS;
       for (int i = 0; i < 3; ++i) {
         const auto body = [&](const std::vector<Vec3>& v, std::size_t at) { return R_BS.row(i).dot(v[at]); };
-        gyro[i].push_back(between(body(rows.gyro_rad_s, k), body(rows.gyro_rad_s, k + 1)));
-        accel[i].push_back(between(body(rows.accel_m_s2, k), body(rows.accel_m_s2, k + 1)));
+        gyro(n, i) = between(body(rows.gyro_rad_s, k), body(rows.gyro_rad_s, k + 1));
+        accel(n, i) = between(body(rows.accel_m_s2, k), body(rows.accel_m_s2, k + 1));
       }
       WheelValues w{};
       WheelValues u{};
       for (std::size_t i = 0; i < w.size(); ++i) {
         w[i] = between(rows.wheel_rad[k][i], rows.wheel_rad[k + 1][i]);
         u[i] = between(rows.drive[k][i], rows.drive[k + 1][i]);
-        wheel[i].push_back(w[i]);
+        wheel(n, Eigen::Index(i)) = w[i];
       }
       const std::array<double, 3> axes = robot.input(u);
-      for (std::size_t i = 0; i < 2; ++i) {
-        roll[i].push_back(robot.rolling(w)(static_cast<int>(i)));
-        drive_roll[i].push_back(i == 0 || !robot.yaw ? axes[i] : 0.0);
-      }
-      if (robot.yaw) {
-        yaw.push_back(robot.yaw(w));
-        wheel_half_difference.push_back(0.5 * (w[0] - w[1]));
-        drive_half_difference.push_back(0.5 * (u[0] - u[1]));
-      }
-      used.push_back(map.balancing.empty() ||
-                     std::any_of(map.balancing.begin(), map.balancing.end(),
-                                 [t](const Stretch& b) { return t > b.from_s + 0.2 && t < b.to_s; }));
+      roll.row(n) = robot.rolling(w).array();
+      drive_roll.row(n) << axes[0], robot.yaw ? 0.0 : axes[1];
+      yaw(n) = robot.yaw ? robot.yaw(w) : 0.0;
+      wheel_half_difference(n) = 0.5 * (w[0] - w[1]);
+      drive_half_difference(n) = 0.5 * (u[0] - u[1]);
+      if (map.balancing.empty() ||
+          std::any_of(map.balancing.begin(), map.balancing.end(),
+                      [t](const Stretch& b) { return t > b.from_s + 0.2 && t < b.to_s; }))
+        used.push_back(n);
     }
   }
 
   /// In the balancing band, of the ticks that count.
-  Series part(const Series& x) const {
-    const Series band = balancing(x);
-    Series out;
-    for (std::size_t k = 0; k < band.size(); ++k)
-      if (used[k]) out.push_back(band[k]);
-    return out;
-  }
+  Series part(const Series& x) const { return balancing(x)(used); }
   /// y = sum c_i x_i; degrees of freedom by bandwidth, two a second and Hz.
   std::vector<Coefficient> fit(const std::vector<Series>& x, const Series& y) const {
-    const auto column = [this](const Series& of) {
-      const Series counted = part(of);
-      return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(counted.data(), Eigen::Index(counted.size())));
-    };
-    const Eigen::VectorXd Y = column(y);
+    const Eigen::VectorXd Y = part(y);
     Eigen::MatrixXd X(Y.size(), Eigen::Index(x.size()));
-    for (std::size_t i = 0; i < x.size(); ++i) X.col(Eigen::Index(i)) = column(x[i]);
+    for (std::size_t i = 0; i < x.size(); ++i) X.col(Eigen::Index(i)) = part(x[i]);
     const Eigen::FullPivLU<Eigen::MatrixXd> lu(X.transpose() * X);
     if (!lu.isInvertible()) return std::vector<Coefficient>(x.size(), {0.0, INFINITY});
     const Eigen::MatrixXd inverse = lu.inverse();
@@ -103,17 +91,17 @@ struct Force {
   Force(const Grid& g, const ImportedRobot& robot, int axis)
       : sign(axis == 0 ? 1.0 : -1.0),
         r(robot.rolling_radius_m),
-        felt(combine(g.accel[1 - axis], sign, integral(product(g.gyro[2], g.accel[axis])))),
-        gyro_part(combine(scaled(kGravity_m_s2, integral(g.gyro[axis])), -(r + robot.imu_height_m),
-                          derivative(g.gyro[axis]))) {}
-  Series rolling_acceleration() const { return scaled(1.0 / r, combine(gyro_part, -sign, felt)); }
+        felt(g.accel.col(1 - axis) + sign * integral(g.gyro.col(2) * g.accel.col(axis))),
+        gyro_part(kGravity_m_s2 * integral(g.gyro.col(axis)) -
+                  (r + robot.imu_height_m) * derivative(g.gyro.col(axis))) {}
+  Series rolling_acceleration() const { return 1.0 / r * (gyro_part - sign * felt); }
 };
 
 /// What the specific force says of the gyro (its first coefficient) and of the wheels.
 std::vector<Coefficient> against_accel(const Grid& g, const ImportedRobot& robot, int axis) {
   const Force f(g, robot, axis);
-  const Series wheels = scaled(-f.sign * f.r, derivative(derivative(g.roll[axis])));
-  return g.fit({scaled(f.sign, f.gyro_part), wheels}, f.felt);
+  const Series wheels = -f.sign * f.r * derivative(derivative(g.roll.col(axis)));
+  return g.fit({f.sign * f.gyro_part, wheels}, f.felt);
 }
 
 std::string shown(const Coefficient& c) {
@@ -174,7 +162,7 @@ Coefficient rate_per_drive(const Grid& g, const ImportedRobot& robot, const Seri
                            const Series& drive, double gear = 1.0) {
   Coefficient c = g.fit({drive}, derivative(angle)).front();
   constexpr double kLeast = 1e-3;  // of the nominal voltage; less does not move a wheel
-  if (std::sqrt(mean_square(g.part(drive))) < kLeast) return {0.0, INFINITY};
+  if (std::sqrt(g.part(drive).square().mean()) < kLeast) return {0.0, INFINITY};
   const double no_load = robot.motor.no_load_rad_s(robot.motor.nominal_V) / (gear * gear);
   return {c.value / no_load, c.sigma / no_load};
 }
@@ -183,7 +171,7 @@ void check_drive(const Grid& g, const ImportedRobot& robot, std::vector<Check>* 
   const std::array<double, 3> axis_of_first = robot.input({1.0});
   const double gear = robot.yaw ? 1.0 : Vec3(axis_of_first.data()).norm();  // ball over wheel radius
   for (int axis = 0; axis < (robot.yaw ? 1 : 2); ++axis) {
-    const Coefficient c = rate_per_drive(g, robot, g.roll[axis], g.drive_roll[axis], gear);
+    const Coefficient c = rate_per_drive(g, robot, g.roll.col(axis), g.drive_roll.col(axis), gear);
     Check check{axis == 0 ? "drive_wheels" : "drive_wheels_y", std::nullopt, c.value,
                 "wheel rate per drive, of the no-load speed: " + shown(c)};
     if (c.known()) check.ok = c.value > 0.02 && c.value < 3.0;
@@ -200,7 +188,7 @@ void check_drive(const Grid& g, const ImportedRobot& robot, std::vector<Check>* 
 /// The two wheels' difference against the gyro's z, and against the difference of their drives.
 void check_yaw(const Grid& g, const ImportedRobot& robot, std::vector<Check>* checks) {
   if (!robot.yaw) return;
-  const Coefficient gyro = g.fit({derivative(g.yaw)}, g.gyro[2]).front();
+  const Coefficient gyro = g.fit({derivative(g.yaw)}, g.gyro.col(2)).front();
   const Coefficient drive = rate_per_drive(g, robot, g.wheel_half_difference, g.drive_half_difference);
   const bool opposed = drive.known() && drive.value < 0.0;
   const bool agree = drive.known() && drive.value > 0.0;
@@ -222,8 +210,7 @@ void check_yaw(const Grid& g, const ImportedRobot& robot, std::vector<Check>* ch
 void check_order(const Grid& g, const ImportedRobot& robot, std::vector<Check>* checks) {
   if (robot.yaw) return;
   const std::vector<Series> ball{Force(g, robot, 0).rolling_acceleration(),
-                                 Force(g, robot, 1).rolling_acceleration(),
-                                 scaled(-1.0, derivative(g.gyro[2]))};
+                                 Force(g, robot, 1).rolling_acceleration(), -derivative(g.gyro.col(2))};
   Mat3 configured;
   Mat3 measured;
   bool known = true;
@@ -231,7 +218,7 @@ void check_order(const Grid& g, const ImportedRobot& robot, std::vector<Check>* 
     WheelValues one{};
     one[static_cast<std::size_t>(i)] = 1.0;
     configured.col(i) = Eigen::Map<const Vec3>(robot.input(one).data());
-    const std::vector<Coefficient> c = g.fit(ball, derivative(derivative(g.wheel[i])));
+    const std::vector<Coefficient> c = g.fit(ball, derivative(derivative(g.wheel.col(i))));
     const double sigma = std::hypot(c[0].sigma, c[1].sigma);
     for (std::size_t axis = 0; axis < 3; ++axis)
       measured(static_cast<int>(axis), i) = axis < 2 || c[axis].known() ? c[axis].value : 0.0;
@@ -251,9 +238,8 @@ void check_order(const Grid& g, const ImportedRobot& robot, std::vector<Check>* 
 
 /// A balancing robot's z points up.
 Check check_up(const Grid& g, const ImportMap& map) {
-  Series up;
-  for (std::size_t k = 0; k < g.used.size(); ++k)
-    if (g.used[k]) up.push_back(g.accel[2][k]);
+  std::vector<double> up;
+  for (const Eigen::Index k : g.used) up.push_back(g.accel(k, 2));
   Check c{"accel_up", std::nullopt, kNotGiven, "no balancing stretch"};
   if (up.empty()) return c;
   c.value = median(up) / kGravity_m_s2;
@@ -272,7 +258,7 @@ std::vector<Check> check_import(const Table& table, const ImportedRows& rows, co
   if (rows.t_s.back() - rows.t_s.front() < 1.0) return checks;  // too short to move
   const Grid grid(rows, map, robot);
   checks.push_back(check_up(grid, map));
-  if (std::count(grid.used.begin(), grid.used.end(), true) < 100) return checks;
+  if (grid.used.size() < 100) return checks;
   check_order(grid, robot, &checks);
   check_tilt(grid, robot, &checks);
   check_drive(grid, robot, &checks);

@@ -1,65 +1,43 @@
 // Series of one value per tick: filters and sums that the checks of an import need. Not RT-safe.
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
-#include <numeric>
-#include <vector>
 
 #include "equipoise/types.hpp"
 
 namespace equipoise::app {
 
-using Series = std::vector<double>;
+using Series = Eigen::ArrayXd;
 
 inline constexpr double kLow_Hz = 0.5;  // balancing moves in this band: below it biases, above it vibration
 inline constexpr double kHigh_Hz = 5.0;
 
 /// First-order low-pass.
-inline Series smooth(const Series& x, double hz) {
+inline Series smooth(Series x, double hz) {
   const double share = 1.0 - std::exp(-2.0 * kPi * hz * kTickS);
-  Series y;
-  double s = x.front();
-  for (const double each : x) y.push_back(s += share * (each - s));
-  return y;
-}
-
-inline Series combine(const Series& a, double factor, const Series& b) {
-  Series out(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) out[k] = a[k] + factor * b[k];
-  return out;
+  double s = x(0);
+  for (double& each : x) each = s += share * (each - s);
+  return x;
 }
 
 /// What balancing moves, of any number of signals alike: their phases to each other stay.
 inline Series balancing(const Series& x) {
   const Series quiet = smooth(smooth(x, kHigh_Hz), kHigh_Hz);
-  return smooth(combine(quiet, -1.0, smooth(quiet, kLow_Hz)), 2.0 * kHigh_Hz);
+  return smooth(quiet - smooth(quiet, kLow_Hz), 2.0 * kHigh_Hz);
 }
 
 inline Series derivative(const Series& x) {
-  Series y(x.size(), 0.0);
-  for (std::size_t k = 1; k + 1 < x.size(); ++k) y[k] = (x[k + 1] - x[k - 1]) / (2.0 * kTickS);
+  Series y = Series::Zero(x.size());
+  const Eigen::Index inner = x.size() - 2;
+  y.segment(1, inner) = (x.tail(inner) - x.head(inner)) / (2.0 * kTickS);
   return y;
-}
-
-inline Series scaled(double factor, Series x) {
-  for (double& each : x) each *= factor;
-  return x;
 }
 
 inline Series integral(const Series& x) {
-  Series y(x.size(), 0.0);
-  for (std::size_t k = 1; k < x.size(); ++k) y[k] = y[k - 1] + 0.5 * kTickS * (x[k] + x[k - 1]);
+  Series y = Series::Zero(x.size());
+  for (Eigen::Index k = 1; k < x.size(); ++k) y(k) = y(k - 1) + 0.5 * kTickS * (x(k) + x(k - 1));
   return y;
-}
-
-inline Series product(const Series& a, const Series& b) {
-  Series out(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) out[k] = a[k] * b[k];
-  return out;
-}
-
-inline double mean_square(const Series& x) {
-  return std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size());
 }
 
 }  // namespace equipoise::app

@@ -13,7 +13,7 @@ constexpr double kNearUnit = 0.2;  // as close to a factor of units is a mistake
 
 }  // namespace
 
-double median(Series values) {
+double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -33,14 +33,14 @@ Check check_rows(const Table& table) {
           format("%zu rows; %zu with another number of cells are skipped", table.rows(), torn)};
 }
 
-Series steps(const Series& t_s) {
-  Series dt;
+std::vector<double> steps(const std::vector<double>& t_s) {
+  std::vector<double> dt;
   for (std::size_t k = 1; k < t_s.size(); ++k) dt.push_back(t_s[k] - t_s[k - 1]);
   return dt;
 }
 
 Check check_clock(const ImportedRows& rows) {
-  const Series dt = steps(rows.t_s);
+  const std::vector<double> dt = steps(rows.t_s);
   const double usual = median(dt);
   const double late = *std::max_element(dt.begin(), dt.end());
   Check c{"clock", std::nullopt, 1.0 / usual,
@@ -54,7 +54,7 @@ Check check_clock(const ImportedRows& rows) {
 }
 
 Check check_gaps(const ImportedRows& rows) {
-  const Series dt = steps(rows.t_s);
+  const std::vector<double> dt = steps(rows.t_s);
   const double usual = median(dt);
   const auto gaps =
       std::count_if(dt.begin(), dt.end(), [&](double d) { return d > 2.5 * usual && d > kTickS; });
@@ -107,7 +107,7 @@ Check check_jumps(const ImportedRows& rows, const ImportedRobot& robot) {
 }
 
 Check check_norm(const ImportedRows& rows) {
-  Series norms;
+  std::vector<double> norms;
   for (const Vec3& f : rows.accel_m_s2)
     if (f.allFinite()) norms.push_back(f.norm());
   const double share = norms.empty() ? kNotGiven : median(norms) / kGravity_m_s2;

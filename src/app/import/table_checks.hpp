@@ -7,11 +7,10 @@
 #include <vector>
 
 #include "app/import/checks.hpp"
-#include "app/import/signals.hpp"
 
 namespace equipoise::app {
 
-double median(Series values);
+double median(std::vector<double> values);
 /// Which mistake of units makes a factor of `scale`; empty: none that is known.
 std::string units_mistake(double scale, const std::vector<std::pair<double, const char*>>& known);
 
