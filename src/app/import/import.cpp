@@ -11,27 +11,16 @@
 namespace equipoise::app {
 namespace {
 
-/// The columns that a map names, out of a table.
-class Columns {
- public:
-  explicit Columns(const Table& table) : table_(table) {}
-
-  std::vector<double> operator()(const SignedColumn& column) const {
-    const auto found = std::find(table_.names.begin(), table_.names.end(), column.name);
-    if (found == table_.names.end()) {
-      std::string names;
-      for (const std::string& name : table_.names) names += (names.empty() ? "" : ", ") + name;
-      throw InputError("the table has no column \"" + column.name + "\", which the map names; it has " +
-                       names);
-    }
-    std::vector<double> values = table_.columns[static_cast<std::size_t>(found - table_.names.begin())];
-    for (double& v : values) v *= column.factor;
-    return values;
-  }
-
- private:
-  const Table& table_;
-};
+/// The column that a map names, out of a table.
+std::vector<double> column_of(const Table& table, const SignedColumn& column) {
+  const auto found = std::find(table.names.begin(), table.names.end(), column.name);
+  if (found == table.names.end())
+    throw InputError("the table has no column \"" + column.name + "\", which the map names; it has " +
+                     joined(table.names));
+  std::vector<double> values = table.columns[static_cast<std::size_t>(found - table.names.begin())];
+  for (double& v : values) v *= column.factor;
+  return values;
+}
 
 /// A first-order filter taken back.
 void take_back(double low_pass_hz, const std::vector<double>& t_s, std::vector<double>* values) {
@@ -44,9 +33,9 @@ void take_back(double low_pass_hz, const std::vector<double>& t_s, std::vector<d
   }
 }
 
-std::vector<double> channel_column(const Columns& columns, const Channel& channel, std::size_t axis,
+std::vector<double> channel_column(const Table& table, const Channel& channel, std::size_t axis,
                                    const std::vector<double>& t_s, const std::vector<std::size_t>& used) {
-  const std::vector<double> all = columns(channel.axes[axis]);
+  const std::vector<double> all = column_of(table, channel.axes[axis]);
   std::vector<double> values;
   values.reserve(used.size());
   for (const std::size_t row : used) values.push_back(all[row]);
@@ -74,9 +63,9 @@ double drive_share(const std::string& kind, double value, double battery_V, doub
   return value / motor.nominal_V;
 }
 
-std::vector<double> row_times(const Columns& columns, const ImportMap& map, std::size_t rows) {
+std::vector<double> row_times(const Table& table, const ImportMap& map, std::size_t rows) {
   if (!map.time.name.empty()) {
-    std::vector<double> t = columns(map.time);
+    std::vector<double> t = column_of(table, map.time);
     if (map.time_is_step)
       for (std::size_t k = 1; k < t.size(); ++k) t[k] += t[k - 1];
     const double first = map.time_is_step ? t.front() : 0.0;
@@ -89,11 +78,11 @@ std::vector<double> row_times(const Columns& columns, const ImportMap& map, std:
 }
 
 /// Rows in the time that the map asks for, each after the one before.
-std::vector<std::size_t> advancing_rows(const Columns& columns, const ImportMap& map, std::size_t count,
+std::vector<std::size_t> advancing_rows(const Table& table, const ImportMap& map, std::size_t count,
                                         ImportedRows* rows) {
   if (count == 0) throw InputError("the table has no row of numbers");
   std::vector<std::size_t> used;
-  const std::vector<double> times = row_times(columns, map, count);
+  const std::vector<double> times = row_times(table, map, count);
   for (std::size_t k = 0; k < times.size(); ++k) {
     if (!(times[k] >= map.from_s && times[k] <= map.to_s)) continue;
     if (!rows->t_s.empty() && !(times[k] > rows->t_s.back())) {
@@ -192,12 +181,11 @@ ImportedRobot imported_robot(const std::string& path) {
       std::copy(u.data(), u.data() + u.size(), axes.begin());
       return axes;
     };
+    robot.imu_height_m = config.robot.l_a.z();
     if constexpr (Robot::kWheels == 2) {
-      robot.imu_height_m = config.robot.l_a.z();
       robot.rolling = [=](const WheelValues& w) { return Vec2(kinematics.phi(wheels(w)), 0.0); };
       robot.yaw = [=](const WheelValues& w) { return kinematics.psi(wheels(w)); };
     } else {
-      robot.imu_height_m = config.robot.l_a.z();
       robot.rolling = [=](const WheelValues& w) {
         return Vec2(kinematics.ball_from_wheels(wheels(w)).template head<2>());
       };
@@ -218,9 +206,8 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
                      " columns; a robot of type " + robot.run.robot + " has " + std::to_string(wheels) +
                      " wheels");
   }
-  const Columns columns(table);
   ImportedRows rows;
-  const std::vector<std::size_t> used = advancing_rows(columns, map, table.rows(), &rows);
+  const std::vector<std::size_t> used = advancing_rows(table, map, table.rows(), &rows);
   constexpr double kLongest_s = 7200.0;  // one wrong stamp would ask for ticks until the memory is full
   const double lasts_s = rows.t_s.back() - rows.t_s.front();
   if (!(lasts_s <= kLongest_s))
@@ -236,12 +223,12 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
   rows.battery_V.assign(n, map.battery_V);
   rows.tilt_rad.assign(n, Vec2::Constant(kNotGiven));
   if (!map.battery.name.empty()) {
-    const std::vector<double> all = columns(map.battery);
+    const std::vector<double> all = column_of(table, map.battery);
     for (std::size_t k = 0; k < n; ++k) rows.battery_V[k] = all[used[k]];
   }
   const auto pick = [&](const Channel& channel, auto* to) {
     for (std::size_t i = 0; i < channel.axes.size(); ++i) {
-      const std::vector<double> axis = channel_column(columns, channel, i, rows.t_s, used);
+      const std::vector<double> axis = channel_column(table, channel, i, rows.t_s, used);
       for (std::size_t k = 0; k < n; ++k) (*to)[k](static_cast<int>(i)) = axis[k];
     }
   };
@@ -249,9 +236,9 @@ ImportedRows imported_rows(const Table& table, const ImportMap& map, const Impor
   pick(map.accel, &rows.accel_m_s2);
   pick(map.tilt, &rows.tilt_rad);
   for (std::size_t i = 0; i < wheels; ++i) {
-    std::vector<double> wheel = channel_column(columns, map.wheels, i, rows.t_s, used);
+    std::vector<double> wheel = channel_column(table, map.wheels, i, rows.t_s, used);
     if (map.wheels.kind == "rate") integrate(rows.t_s, &wheel);
-    const std::vector<double> drive = channel_column(columns, map.drive, i, rows.t_s, used);
+    const std::vector<double> drive = channel_column(table, map.drive, i, rows.t_s, used);
     for (std::size_t k = 0; k < n; ++k) {
       const std::size_t before = k == 0 ? 0 : k - 1;
       const double dt = rows.t_s[std::max<std::size_t>(k, 1)] - rows.t_s[before];
@@ -270,14 +257,14 @@ std::vector<BenchSample> imported_bench(const Table& table, const ImportMap& map
       throw InputError(format("%s.axes of the map names %zu columns: there is no motor %zu", key,
                               channel->axes.size(), motor + 1));
   if (map.drive.kind == "torque") throw InputError("drive.kind of a motor bench is volts or duty");
-  const Columns columns(table);
   ImportedRows rows;
-  const std::vector<std::size_t> used = advancing_rows(columns, map, table.rows(), &rows);
-  std::vector<double> angle = channel_column(columns, map.wheels, motor, rows.t_s, used);
+  const std::vector<std::size_t> used = advancing_rows(table, map, table.rows(), &rows);
+  std::vector<double> angle = channel_column(table, map.wheels, motor, rows.t_s, used);
   if (map.wheels.kind == "rate") integrate(rows.t_s, &angle);
-  const std::vector<double> drive = channel_column(columns, map.drive, motor, rows.t_s, used);
-  const std::vector<double> current = channel_column(columns, map.current, motor, rows.t_s, used);
-  const std::vector<double> battery = map.battery.name.empty() ? std::vector<double>{} : columns(map.battery);
+  const std::vector<double> drive = channel_column(table, map.drive, motor, rows.t_s, used);
+  const std::vector<double> current = channel_column(table, map.current, motor, rows.t_s, used);
+  const std::vector<double> battery =
+      map.battery.name.empty() ? std::vector<double>{} : column_of(table, map.battery);
   std::vector<BenchSample> samples(used.size());
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const double supply_V = battery.empty() ? map.battery_V : battery[used[k]];

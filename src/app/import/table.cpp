@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 
 #include "app/text/errors.hpp"
@@ -11,10 +12,6 @@
 
 namespace equipoise::app {
 namespace {
-
-bool ends_in(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 constexpr std::string_view kBlank = " \t\r\"";
 
@@ -132,14 +129,11 @@ Table read_float32_table(const std::string& path, const TableShape& shape) {
 }  // namespace
 
 Table read_table(const std::string& path, const TableShape& shape) {
-  for (const char* other : {".mat", ".parquet", ".feather", ".h5", ".xlsx"}) {
-    if (ends_in(path, other)) {
-      std::string todo = path;
-      todo += ": is no text; make a CSV of it: ./tools/table " + path + " > ";
-      todo.append(path, 0, path.rfind('.')) += ".csv";
-      throw InputError(todo);
-    }
-  }
+  std::filesystem::path file(path);
+  for (const char* other : {".mat", ".parquet", ".feather", ".h5", ".xlsx"})
+    if (file.extension() == other)
+      throw InputError(path + ": is no text; make a CSV of it: ./tools/table " + path + " > " +
+                       file.replace_extension(".csv").string());
   return shape.float32 ? read_float32_table(path, shape) : read_text_table(path, shape);
 }
 

@@ -1,9 +1,10 @@
-// Text as printf makes it, of up to 399 characters.
+// Text as printf makes it, of up to 399 characters; names in a row.
 #pragma once
 
 #include <cstdarg>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 namespace equipoise::app {
 
@@ -14,6 +15,12 @@ namespace equipoise::app {
   (void)std::vsnprintf(out, sizeof out, text, arguments);
   va_end(arguments);
   return out;
+}
+
+inline std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
 }
 
 }  // namespace equipoise::app
