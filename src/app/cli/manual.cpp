@@ -2,6 +2,7 @@
 #include <sstream>
 
 #include "app/cli/description.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -46,11 +47,7 @@ std::string facts(const OptionDescription& o) {
   std::string text;
   const auto add = [&text](const std::string& fact) { text += (text.empty() ? "" : "; ") + fact; };
   if (o.required) add("required");
-  if (!o.choices.empty()) {
-    std::string names;
-    for (const std::string& name : o.choices) names += (names.empty() ? "" : ", ") + name;
-    add("one of: " + names);
-  }
+  if (!o.choices.empty()) add("one of: " + joined(o.choices));
   if (!o.range.empty()) add("from " + o.range);
   if (!o.standard.empty()) add("default: " + o.standard);
   if (o.repeats) add("may be repeated");

@@ -11,6 +11,7 @@
 #include "app/cli/commands.hpp"
 #include "app/log/run_log.hpp"
 #include "app/text/files.hpp"
+#include "app/text/format.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 #include "equipoise/runtime/wire.hpp"
 
@@ -94,12 +95,7 @@ class CsvRows {
         if (has) row_ += text_of(value);
       });
     };
-    row_.clear();
-    char time[32];
-    std::snprintf(time, sizeof time, "%.6f", static_cast<double>(tick.now_ns) * 1e-9);
-    row_ += time;
-    row_ += ',';
-    row_ += text_of(tick.tick);
+    row_ = format("%.6f,", static_cast<double>(tick.now_ns) * 1e-9) + text_of(tick.tick);
     fields::each_message(
         tick, [&](auto message, const char*, const auto& record) { cells(message, record, true); });
     if (has_truth_) cells(fields::State{}, tick.truth, tick.has_truth);

@@ -22,12 +22,6 @@ struct ReplayArguments {
   std::string config;  // of the shadow
 };
 
-std::string shown(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-
 nlohmann::json to_json(const Beside& beside, const runtime::RunInfo& run, const Retuned& t) {
   const std::int64_t ticks = t.difference.ticks;
   return {{"set", beside.set},
@@ -108,9 +102,9 @@ void print(std::FILE* out, const ReplayArguments& a, const runtime::RunInfo& run
   }
   if (r.damaged_bytes > 0) std::fprintf(out, "  %zu bytes are damaged and skipped\n", r.damaged_bytes);
   if (r.difference.found) {
-    std::fprintf(out, "  DIFFERS first at tick %lld: %s: logged %s, replayed %s\n",
-                 static_cast<long long>(r.difference.tick), r.difference.field.c_str(),
-                 shown(r.difference.logged).c_str(), shown(r.difference.replayed).c_str());
+    std::fprintf(out, "  DIFFERS first at tick %lld: %s: logged %.17g, replayed %.17g\n",
+                 static_cast<long long>(r.difference.tick), r.difference.field.c_str(), r.difference.logged,
+                 r.difference.replayed);
   } else {
     std::fprintf(out, "  estimate, control and duty are the same, bit for bit\n");
   }

@@ -1,6 +1,6 @@
 #include "app/text/reasons.hpp"
 
-#include <cstdio>
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -25,10 +25,8 @@ bool beyond(const ReasonLimit& l, const ReasonNumbers& n, const SafetyParams& p)
 std::string explained(const Reason& reason, const ReasonNumbers& n, const SafetyParams& p) {
   for (const ReasonLimit& l : reason.limits) {
     if (!beyond(l, n, p)) continue;
-    char text[120];
-    std::snprintf(text, sizeof text, "%s %.2f%s, limit %.2f%s: ", l.what, l.value(n, p), l.unit, p.*l.limit,
-                  l.unit);
-    return text + std::string(reason.remedy);
+    return format("%s %.2f%s, limit %.2f%s: ", l.what, l.value(n, p), l.unit, p.*l.limit, l.unit) +
+           reason.remedy;
   }
   return std::string(reason.name) + ": " + reason.text + "; " + reason.remedy;
 }
@@ -167,11 +165,7 @@ std::vector<std::string> degraded_names(std::uint32_t degraded) {
   return names_of(degraded_modes(), degraded);
 }
 
-std::string reasons_text(std::uint32_t reasons) {
-  std::string text;
-  for (const std::string& name : reason_names(reasons)) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
+std::string reasons_text(std::uint32_t reasons) { return joined(reason_names(reasons)); }
 
 std::vector<std::string> reasons_explained(std::uint32_t reasons, const ReasonNumbers& numbers,
                                            const SafetyParams& limits) {

@@ -1,7 +1,6 @@
 #include "app/trial/fault_verdict.hpp"
 
-#include <cstdio>
-
+#include "app/text/format.hpp"
 #include "app/text/json.hpp"
 
 namespace equipoise::app {
@@ -40,10 +39,8 @@ std::string FaultVerdict::sentence() const {
   std::string who = std::string(taken() ? "verdict: " : "verdict taken back: ") + shown(evidence.leading);
   if (has(found, evidence.leading) && has(found, evidence.runner_up))
     who += std::string(" or ") + shown(evidence.runner_up);
-  char numbers[120];
-  std::snprintf(numbers, sizeof numbers, ", log-likelihood ratio %.1f, bound %.1f, runner-up %s %.1f",
-                evidence.ratio, evidence.bound, shown(evidence.runner_up), evidence.runner_up_ratio);
-  return who + numbers;
+  return who + format(", log-likelihood ratio %.1f, bound %.1f, runner-up %s %.1f", evidence.ratio,
+                      evidence.bound, shown(evidence.runner_up), evidence.runner_up_ratio);
 }
 
 std::optional<FaultVerdict> FaultVerdicts::observe(double t_s, const FaultEvidence& evidence) noexcept {

@@ -1,21 +1,16 @@
 #include "app/trial/firmware.hpp"
 
+#include "app/text/format.hpp"
 #include "app/text/version.hpp"
 
 namespace equipoise::app {
 namespace {
 
-std::string list(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 /// "mbbr: a, b; mip: c, d".
 std::string per_robot(const std::vector<std::string> RobotType::*names) {
   std::string text;
   for (const RobotType* robot : robot_types())
-    text += (text.empty() ? "" : "; ") + std::string(robot->name) + ": " + list(robot->*names);
+    text += (text.empty() ? "" : "; ") + std::string(robot->name) + ": " + joined(robot->*names);
   return text;
 }
 
@@ -28,7 +23,7 @@ const RobotType& robot_type_of(const std::string& name, const std::string& where
     names.emplace_back(robot->name);
   }
   throw ConfigError(where + ": robot.type: \"" + name +
-                    "\" is no robot of this build; allowed: " + list(names));
+                    "\" is no robot of this build; allowed: " + joined(names));
 }
 
 std::unique_ptr<const ConfiguredRobot> load_robot(const std::string& path, const Overrides& overrides) {
@@ -43,7 +38,7 @@ void complete(const RobotType& robot, Choice* choice) {
                          const std::vector<std::string>& names) {
     if (std::find(names.begin(), names.end(), value) != names.end()) return;
     throw ConfigError("--" + what + " " + value + ": not known to " + robot.name +
-                      "; allowed: " + list(names));
+                      "; allowed: " + joined(names));
   };
   if (choice->estimator.empty()) choice->estimator = robot.default_estimator;
   if (choice->controller.empty()) choice->controller = robot.default_controller;
