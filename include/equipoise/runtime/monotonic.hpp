@@ -1,4 +1,4 @@
-// CLOCK_MONOTONIC as nanoseconds, the loop clock of hardware. RT-safe: a vDSO call; a sleep.
+// CLOCK_MONOTONIC as numbers, the loop clock of hardware. RT-safe: a vDSO call; a sleep.
 #pragma once
 
 #include <time.h>
@@ -12,6 +12,9 @@ inline std::int64_t monotonic_now_ns() noexcept {
   clock_gettime(CLOCK_MONOTONIC, &now);
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
 }
+
+/// For waits and silences; not for ticks.
+inline double now_s() noexcept { return 1e-9 * static_cast<double>(monotonic_now_ns()); }
 
 /// Returns early when a signal comes.
 inline void sleep_until(std::int64_t at_ns) noexcept {

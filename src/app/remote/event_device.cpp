@@ -6,8 +6,8 @@
 #include <cstring>
 #include <thread>
 
-#include "app/remote/seconds.hpp"
 #include "app/text/errors.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {
 EventDevice::EventDevice(RemoteFile file) : file_(std::move(file)), controls_(file_.events.size()) {
@@ -46,7 +46,7 @@ int EventDevice::open() {
     }
     axis.waiting = known < 0 || share(axis, about.value) != 0.0;
   }
-  last_event_s_ = now_s();
+  last_event_s_ = runtime::now_s();
   return 0;
 }
 
@@ -111,10 +111,10 @@ Hand EventDevice::look(int milliseconds) {
       hand.present = false;
       return hand;
     }
-    last_event_s_ = now_s();
+    last_event_s_ = runtime::now_s();
     take(event, &hand);
   }
-  hand.heard = now_s() - last_event_s_ <= file_.hold_s;
+  hand.heard = runtime::now_s() - last_event_s_ <= file_.hold_s;
   if (!hand.heard) return hand;
   std::array<double, kHandActions.size()> sum{};
   for (std::size_t i = 0; i < controls_.size(); ++i)

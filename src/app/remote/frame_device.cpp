@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "app/remote/seconds.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {
 std::optional<HandAction> FrameMatcher::push(char byte) {
@@ -69,7 +69,7 @@ Hand FrameDevice::look(int milliseconds) {
   if (serial_.fd < 0 &&
       serial_open(&serial_, file_.device.c_str(), static_cast<std::uint32_t>(file_.baud)) < 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
-    Hand hand = pad_.hand(now_s());
+    Hand hand = pad_.hand(runtime::now_s());
     hand.present = false;
     return hand;
   }
@@ -79,7 +79,7 @@ Hand FrameDevice::look(int milliseconds) {
   const int count = serial_read(&serial_, bytes.data(), bytes.size());
   if (count == -EIO || count == -ENODEV) serial_close(&serial_);  // the adapter was pulled out
   constexpr double kQuiet_s = 0.2;
-  const double now = now_s();
+  const double now = runtime::now_s();
   if (count > 0 && now - byte_s_ > kQuiet_s) matcher_.forget();
   if (count > 0) byte_s_ = now;
   for (int i = 0; i < count; ++i) {

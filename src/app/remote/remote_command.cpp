@@ -13,9 +13,9 @@
 #include "app/commission/manual_drive.hpp"
 #include "app/remote/frame_learning.hpp"
 #include "app/remote/hand_remote.hpp"
-#include "app/remote/seconds.hpp"
 #include "app/text/files.hpp"
 #include "equipoise/no_copy.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 #include "serial.h"
 
 namespace equipoise::app {
@@ -42,7 +42,7 @@ struct Port : NoCopy {
     constexpr double kQuiet_s = 1.0;
     constexpr double kLongest_s = 20.0;
     std::vector<Portion> portions;
-    for (double until_s = now_s() + wait_s; now_s() < until_s && !interrupted.load();) {
+    for (double until_s = runtime::now_s() + wait_s; runtime::now_s() < until_s && !interrupted.load();) {
       constexpr int kPatience_ms = 50;
       std::array<pollfd, 2> ready{{{serial.fd, POLLIN, 0}, {keys, POLLIN, 0}}};
       if (poll(ready.data(), ready.size(), kPatience_ms) <= 0) continue;
@@ -52,10 +52,10 @@ struct Port : NoCopy {
       if (count == -EAGAIN) continue;
       if (count < 0) throw JobError("the serial port is gone");
       const auto* first = reinterpret_cast<const char*>(bytes.data());
-      portions.push_back({now_s(), std::string(first, first + count)});
+      portions.push_back({runtime::now_s(), std::string(first, first + count)});
       if (portions.back().t_s - portions.front().t_s > kLongest_s)
         throw JobError("bytes come for 20 s without a pause of a second: no button of an app");
-      until_s = now_s() + kQuiet_s;
+      until_s = runtime::now_s() + kQuiet_s;
     }
     if (interrupted.load()) throw JobError("interrupted; nothing was written");
     return portions;
@@ -151,7 +151,7 @@ int lines(const std::string& path) {
   bool moved = false;
   bool present = true;
   double next_s = 0.0;
-  double looked_s = now_s();
+  double looked_s = runtime::now_s();
   double void_until_s = 0.0;
   while (!interrupted.load()) {
     constexpr int kLook_ms = 20;
@@ -159,8 +159,8 @@ int lines(const std::string& path) {
     constexpr double kStopped_s = 1.0;  // this process, or whoever reads its lines
     constexpr double kQueued_s = 0.2;   // what was kept meanwhile comes at once
     Hand hand = gate.limit(device->look(kLook_ms));
-    if (now_s() > looked_s + kStopped_s) void_until_s = now_s() + kQueued_s;
-    looked_s = now_s();
+    if (runtime::now_s() > looked_s + kStopped_s) void_until_s = runtime::now_s() + kQueued_s;
+    looked_s = runtime::now_s();
     if (looked_s < void_until_s) hand.arm = hand.heading_reset = false;  // pressed who knows when
     if (hand.present != present)
       std::fprintf(stderr, "%s: %s\n", path.c_str(), hand.present ? "is back" : "is gone");
@@ -173,10 +173,10 @@ int lines(const std::string& path) {
     }
     if (hand.heading_reset) std::printf("heading-reset\n");
     const bool moves = hand.forward != 0.0 || hand.left != 0.0 || hand.turn != 0.0;
-    if ((moves && now_s() >= next_s) || (moved && !moves)) {
+    if ((moves && runtime::now_s() >= next_s) || (moved && !moves)) {
       std::printf("drive %.4g %.4g %.4g\n", file.speed_m_s * hand.forward, file.speed_m_s * hand.left,
                   file.turn_hz * hand.turn);
-      next_s = now_s() + kEvery_s;
+      next_s = runtime::now_s() + kEvery_s;
       moved = moves;
       said = true;
     }

@@ -1,6 +1,7 @@
 #include "app/remote/remote_file.hpp"
 
 #include <linux/input.h>
+#include <sodium.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -89,18 +90,14 @@ std::vector<EventBinding> event_bindings(Section& s, HandAction action, const st
 }
 
 std::string from_hex(const std::string& text, Section& s, const std::string& key) {
-  const auto digit = [](char c) { return std::string("0123456789abcdef").find(c); };
-  std::string bytes;
-  for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
-    const std::size_t high = digit(text[i]);
-    const std::size_t low = digit(text[i + 1]);
-    if (high == std::string::npos || low == std::string::npos) break;
-    bytes.push_back(static_cast<char>(16 * high + low));
-  }
-  if (bytes.empty() || 2 * bytes.size() != text.size() || bytes.size() > kLongestFrame)
+  std::array<std::uint8_t, kLongestFrame> bytes{};
+  std::size_t size = 0;
+  (void)sodium_hex2bin(bytes.data(), bytes.size(), text.data(), text.size(), nullptr, &size, nullptr);
+  const std::string frame(reinterpret_cast<const char*>(bytes.data()), size);
+  if (frame.empty() || to_hex(frame) != text)
     s.fail(key, "\"" + text + "\": allowed: 1 to " + std::to_string(kLongestFrame) +
                     " bytes in hexadecimal, e.g. \"7e46\"");
-  return bytes;
+  return frame;
 }
 
 void read_events(Section s, RemoteFile* out) {
@@ -168,12 +165,10 @@ RemoteFile parse_remote(const std::string& text, const std::string& origin) {
 }
 
 std::string to_hex(const std::string& bytes) {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string text;
-  for (const char c : bytes) {
-    text += kDigits[static_cast<unsigned char>(c) >> 4];
-    text += kDigits[static_cast<unsigned char>(c) & 15];
-  }
+  std::string text(2 * bytes.size() + 1, '\0');
+  sodium_bin2hex(text.data(), text.size(), reinterpret_cast<const unsigned char*>(bytes.data()),
+                 bytes.size());
+  text.pop_back();
   return text;
 }
 
