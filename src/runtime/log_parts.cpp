@@ -3,11 +3,11 @@
 #include <regex.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
+
+#include "equipoise/runtime/big_endian.hpp"
 
 namespace equipoise::runtime {
 namespace {
@@ -51,16 +51,11 @@ bool is_stamp(const std::string& text) {
 std::int64_t first_event_number(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return -1;
-  std::array<char, 12> head{};
+  std::string head(kLogSync.size() + 8, '\0');
   std::ifstream file(path, std::ios::binary);
-  constexpr std::array<unsigned char, 4> kSync{0xED, 0xA1, 0xDA, 0x01};
-  if (!file.read(head.data(), head.size()) ||
-      !std::equal(kSync.begin(), kSync.end(), head.begin(),
-                  [](unsigned char a, char b) { return a == static_cast<unsigned char>(b); }))
+  if (!file.read(head.data(), static_cast<std::streamsize>(head.size())) || head.rfind(kLogSync, 0) != 0)
     return -1;
-  std::uint64_t number = 0;
-  for (std::size_t i = 4; i < head.size(); ++i) number = number << 8U | static_cast<unsigned char>(head[i]);
-  return static_cast<std::int64_t>(number);
+  return static_cast<std::int64_t>(load_big_endian(std::string_view(head).substr(kLogSync.size())));
 }
 
 }  // namespace
@@ -110,18 +105,14 @@ std::vector<std::string> kept_logs(const std::string& path) {
 }
 
 std::string kept_name(const std::string& path, std::int64_t time_s) {
-  const auto time = static_cast<std::time_t>(time_s);
-  std::tm utc{};
-  gmtime_r(&time, &utc);
-  char stamp[32];
-  (void)std::strftime(stamp, sizeof stamp, "%Y%m%dT%H%M%SZ", &utc);
+  const std::string stamp = utc_text(time_s);
   const std::vector<std::string> taken = middles(path);
   std::string middle = stamp;
   const auto is_taken = [&middle](const std::string& other) {
     return other == middle || other.rfind(middle + ".", 0) == 0;
   };
   for (int i = 2; std::any_of(taken.begin(), taken.end(), is_taken); ++i)
-    middle = std::string(stamp) + "-" + std::to_string(i);
+    middle = stamp + "-" + std::to_string(i);
   return with_middle(path, middle);
 }
 

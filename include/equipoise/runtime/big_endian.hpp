@@ -1,8 +1,9 @@
-// Numbers as they lie in a log and on the wire: most significant byte first. In: value -> out: its bytes.
+// Numbers as a log and the wire have them: most significant byte first. In: value -> out: bytes; and back.
 #pragma once
 
 #include <cstdint>
 #include <cstring>
+#include <string_view>
 
 namespace equipoise::runtime {
 
@@ -16,6 +17,13 @@ std::uint8_t* store_big_endian(Unsigned value, std::uint8_t* to) noexcept {
 #endif
   std::memcpy(to, &value, sizeof value);
   return to + sizeof value;
+}
+
+/// Of eight bytes at most.
+inline std::uint64_t load_big_endian(std::string_view bytes) noexcept {
+  std::uint64_t value = 0;
+  for (const char byte : bytes) value = value << 8U | static_cast<unsigned char>(byte);
+  return value;
 }
 
 }  // namespace equipoise::runtime

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,16 @@ namespace equipoise::runtime {
 
 /// What each event of an LCM log begins with.
 inline constexpr std::string_view kLogSync("\xED\xA1\xDA\x01", 4);
+
+/// A moment of Unix time, as the names of logs have it: 20261122T014503Z.
+inline std::string utc_text(std::int64_t time_s, const char* format = "%Y%m%dT%H%M%SZ") {
+  const auto time = static_cast<std::time_t>(time_s);
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  char text[32];
+  (void)std::strftime(text, sizeof text, format, &utc);
+  return text;
+}
 
 /// NAME.lcm, 3 -> NAME.0003.lcm; 0 is NAME.lcm itself.
 std::string log_part(const std::string& path, int number);

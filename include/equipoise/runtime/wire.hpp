@@ -100,11 +100,7 @@ class Decoder {
   void take(T& value) {
     if constexpr (kIsScalar<T>) {
       if (!has(sizeof(T))) return;
-      Unsigned<T> bits{};
-      for (std::size_t i = 0; i < sizeof(T); ++i) {
-        bits = static_cast<Unsigned<T>>(static_cast<std::uint64_t>(bits) << 8U |
-                                        static_cast<unsigned char>(bytes_[i]));
-      }
+      const auto bits = static_cast<Unsigned<T>>(load_big_endian(bytes_.substr(0, sizeof(T))));
       if constexpr (std::is_same_v<T, bool>) {
         value = bits != 0;
       } else {

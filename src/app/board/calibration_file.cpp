@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 
@@ -10,6 +9,7 @@
 #include "app/text/files.hpp"
 #include "app/text/json.hpp"
 #include "config/toml_reader.hpp"
+#include "equipoise/runtime/log_parts.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -90,12 +90,7 @@ std::string head(const char* table, const CalibrationFile::Stamp& stamp) {
 
 CalibrationFile::Stamp stamp_of(double temperature_degC) {
   CalibrationFile::Stamp stamp;
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  (void)std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  stamp.date = text;
+  stamp.date = runtime::utc_text(std::time(nullptr), "%Y-%m-%dT%H:%M:%SZ");
   if (temperature_degC != 0.0) stamp.temperature_degC = temperature_degC;
   return stamp;
 }

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "app/text/errors.hpp"
+#include "equipoise/runtime/big_endian.hpp"
 #include "equipoise/runtime/log_parts.hpp"
 
 namespace equipoise::app {
@@ -14,13 +15,9 @@ constexpr std::size_t kLongestChannel = 256;
 constexpr std::size_t kLargestMessage = 1U << 24U;
 constexpr std::size_t kReadBytes = 1U << 18U;
 
-std::uint64_t big_endian(std::string_view bytes) {
-  std::uint64_t value = 0;
-  for (const char byte : bytes) value = value << 8U | static_cast<unsigned char>(byte);
-  return value;
+std::size_t length(std::string_view four_bytes) {
+  return static_cast<std::size_t>(runtime::load_big_endian(four_bytes));
 }
-
-std::size_t length(std::string_view four_bytes) { return static_cast<std::size_t>(big_endian(four_bytes)); }
 
 }  // namespace
 
@@ -98,7 +95,7 @@ bool LogReader::next(LogEvent* event) {
       const std::string_view header(buffer_.data() + at_, kEventHeader);
       const std::size_t channel = length(header.substr(20, 4));
       const std::size_t data = length(header.substr(24, 4));
-      const auto utime = static_cast<std::int64_t>(big_endian(header.substr(12, 8)));
+      const auto utime = static_cast<std::int64_t>(runtime::load_big_endian(header.substr(12, 8)));
       if (channel <= kLongestChannel && data <= kLargestMessage && has(kEventHeader + channel + data)) {
         const std::string_view body(buffer_.data() + at_ + kEventHeader, channel + data);
         *event = {utime, body.substr(0, channel), body.substr(channel)};
