@@ -7,12 +7,16 @@
 
 #include "bbb_config.h"
 #include "equipoise/overrides.hpp"
+#include "gpio.h"
 
 namespace equipoise::app {
 
 struct BoardLine {
   std::string chip;
   int line = 0;
+  gpio_pin_t pin(bool active_low = false) const {
+    return {chip.c_str(), static_cast<unsigned>(line), active_low};
+  }
 };
 
 struct Board {

@@ -12,35 +12,29 @@ constexpr auto kPoll = std::chrono::milliseconds(10);
 constexpr unsigned kStablePolls = 3;
 constexpr unsigned kPollsPerBlink = 50;
 
-gpio_pin_t pin_of(const BoardLine& line, bool active_low) {
-  gpio_pin_t pin{};
-  pin.chip = line.chip.c_str();
-  pin.offset = static_cast<unsigned>(line.line);
-  pin.active_low = active_low;
-  return pin;
+std::optional<button_t> opened(const BoardLine& line, bool active_low, const char* name) {
+  button_t button{};
+  const gpio_pin_t pin = line.pin(active_low);
+  const int status = button_open(&button, &pin, kStablePolls);
+  if (status == 0) return button;
+  std::fprintf(stderr, "equipoise: warning: button %s: %s\n", name, std::strerror(-status));
+  return std::nullopt;
 }
 
-bool open_button(button_t* button, const BoardLine& line, bool active_low, const char* name) {
-  const gpio_pin_t pin = pin_of(line, active_low);
-  const int status = button_open(button, &pin, kStablePolls);
-  if (status < 0) std::fprintf(stderr, "equipoise: warning: button %s: %s\n", name, std::strerror(-status));
-  return status == 0;
-}
-
-bool was_pressed(button_t* button) {
+bool was_pressed(std::optional<button_t>* button) {
   bool pressed = false;
-  return button_poll(button, &pressed) == 0 && pressed;
+  return *button && button_poll(&**button, &pressed) == 0 && pressed;
 }
 
 }  // namespace
 
-Panel::Panel(const Board& board) {
-  has_pause_ = open_button(&pause_, board.button_pause, board.buttons_active_low, "PAUSE");
-  has_mode_ = open_button(&mode_button_, board.button_mode, board.buttons_active_low, "MODE");
+Panel::Panel(const Board& board)
+    : pause_(opened(board.button_pause, board.buttons_active_low, "PAUSE")),
+      mode_button_(opened(board.button_mode, board.buttons_active_low, "MODE")) {
   constexpr std::array<const char*, 4> kNames{"bat25", "bat50", "bat75", "bat100"};  // the BeagleBone Blue's
   for (const BoardLine& line : board.led_bars) {
     led_t led{};
-    const gpio_pin_t pin = pin_of(line, false);
+    const gpio_pin_t pin = line.pin();
     const char* const name = bars_.size() < kNames.size() ? kNames[bars_.size()] : nullptr;
     if (const int status = led_open(&led, name, &pin); status < 0) {
       std::fprintf(stderr, "equipoise: warning: LED bars: %s\n", std::strerror(-status));
@@ -54,8 +48,8 @@ Panel::Panel(const Board& board) {
 Panel::~Panel() {
   stop_.store(true);
   thread_.join();
-  if (has_pause_) button_close(&pause_);
-  if (has_mode_) button_close(&mode_button_);
+  if (pause_) button_close(&*pause_);
+  if (mode_button_) button_close(&*mode_button_);
   for (led_t& bar : bars_) led_close(&bar);
 }
 
@@ -67,8 +61,8 @@ std::size_t Panel::bars_lit(std::size_t count, std::size_t mode, bool paused, bo
 void Panel::run() {
   std::size_t shown = 0;
   for (unsigned turn = 0; !stop_.load(); ++turn) {
-    if (has_pause_ && was_pressed(&pause_)) paused_.store(!paused_.load(), std::memory_order_relaxed);
-    if (has_mode_ && was_pressed(&mode_button_))
+    if (was_pressed(&pause_)) paused_.store(!paused_.load(), std::memory_order_relaxed);
+    if (was_pressed(&mode_button_))
       mode_.store((mode_.load() + 1) % PanelGate::kShares.size(), std::memory_order_relaxed);
     const std::size_t lit =
         bars_lit(bars_.size(), mode_.load(), paused_.load(), turn / kPollsPerBlink % 2 == 1);

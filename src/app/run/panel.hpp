@@ -7,6 +7,7 @@
 
 #include <array>
 #include <atomic>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -53,8 +54,7 @@ class Panel : NoCopy {
   void run();
 
   PanelGate gate_;
-  button_t pause_{}, mode_button_{};
-  bool has_pause_ = false, has_mode_ = false;
+  std::optional<button_t> pause_, mode_button_;
   std::vector<led_t> bars_;
   std::atomic<bool> paused_{false};
   std::atomic<std::size_t> mode_{0};

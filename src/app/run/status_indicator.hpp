@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <thread>
 
 #include "app/board/board.hpp"
@@ -44,12 +45,8 @@ class StatusIndicator : NoCopy {
  private:
   void run();
 
-  led_t green_{};
-  led_t red_{};
-  bool has_green_ = false;
-  bool has_red_ = false;
-  can_port_t can_{};
-  bool has_can_ = false;
+  std::optional<led_t> green_, red_;
+  std::optional<can_port_t> can_;
   std::atomic<std::uint64_t> now_{0};
   std::atomic<bool> stop_{false};
   std::thread thread_;
