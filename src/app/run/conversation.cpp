@@ -8,6 +8,7 @@
 
 #include "app/cli/interrupt.hpp"
 #include "app/run/wires.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -84,10 +85,8 @@ void Conversation::note_awake() {
 
 void Conversation::refuse_if_late(std::int8_t action) const {
   if (action == signed_command_t::DISARM || stopped_s_ <= kStopped_s) return;
-  std::ostringstream text;
-  text.precision(2);
-  text << "this command was stopped for " << stopped_s_ << " s; it would come too late: give it again";
-  throw std::runtime_error(text.str());
+  throw std::runtime_error(
+      format("this command was stopped for %.2g s; it would come too late: give it again", stopped_s_));
 }
 
 /// One arm, disarm or heading reset of the turn that is now, repeated until the robot has begun the next.

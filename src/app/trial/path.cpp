@@ -9,6 +9,7 @@
 
 #include "app/text/errors.hpp"
 #include "app/text/files.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -52,10 +53,8 @@ class Eight : public Path {
   PathPoint at(double t_s) const noexcept override {
     const auto [u, rate] = eased(t_s);
     const double p = rate_rad_s_ * u;
-    PathPoint point;
-    point.position_W_m = kEight_m * turned(Vec2(std::sin(p), 0.5 * std::sin(2.0 * p)));
-    point.velocity_W_m_s = kEight_m * rate_rad_s_ * rate * turned(Vec2(std::cos(p), std::cos(2.0 * p)));
-    return point;
+    return {kEight_m * turned(Vec2(std::sin(p), 0.5 * std::sin(2.0 * p))),
+            kEight_m * rate_rad_s_ * rate * turned(Vec2(std::cos(p), std::cos(2.0 * p))), 0.0, 0.0};
   }
 
  private:
@@ -81,10 +80,8 @@ class Square : public Path {
     for (int i = 0; i < static_cast<int>(quarter); ++i)
       corner += rotate(0.5 * kPi * i, Vec2(kStraight_m + kCorner_m, kCorner_m));
     const double heading = 0.5 * kPi * quarter;
-    PathPoint point;
-    point.position_W_m = corner + rotate(heading, in_quarter);
-    point.velocity_W_m_s = speed_m_s_ * rate * rotate(heading + angle, Vec2(1.0, 0.0));
-    return point;
+    return {corner + rotate(heading, in_quarter), speed_m_s_ * rate * rotate(heading + angle, Vec2(1.0, 0.0)),
+            0.0, 0.0};
   }
 
  private:
@@ -147,9 +144,7 @@ std::unique_ptr<Waypoints> read_waypoints(const std::string& file_name) {
     std::replace(line.begin(), line.end(), ',', ' ');
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
     const auto fail = [&](const char* what) {
-      std::ostringstream message;
-      message << file_name << ":" << number << ": " << what;
-      throw InputError(message.str());
+      throw InputError(file_name + ":" + std::to_string(number) + ": " + what);
     };
     std::istringstream text(line);
     double t = 0.0;
@@ -174,11 +169,8 @@ void require_feasible(const std::string& name, const Path& path, double until_s,
   constexpr double kOff_rad = kPi / 4.0;  // of a heading that is summed in steps
   const auto require = [&](double value, double limit, const char* what, double t_s) {
     if (value <= limit) return;
-    std::ostringstream text;
-    text.precision(3);
-    text << "--path " << name << ": asks for " << value << " " << what << " at " << t_s
-         << " s; the robot does " << limit;
-    throw InputError(text.str());
+    throw InputError("--path " + name +
+                     format(": asks for %.3g %s at %.3g s; the robot does %.3g", value, what, t_s, limit));
   };
   const auto ticks = static_cast<std::int64_t>(std::ceil(until_s * kTickHz));
   PathPoint before = path.at(0.0);
