@@ -203,8 +203,8 @@ void bind_values(nb::module_& m) {
 
 void bind_request(nb::module_& m) {
   using app::SimRequest;
-  nb::class_<SimRequest>(m, "Request", "A run as it is asked for.")
-      .def(nb::init<>())
+  nb::class_<SimRequest> request(m, "Request", "A run as it is asked for.");
+  request.def(nb::init<>())
       .def_rw("config", &SimRequest::config)
       .def_rw("set", &SimRequest::set)
       .def_rw("robot_number", &SimRequest::robot)
@@ -213,22 +213,19 @@ void bind_request(nb::module_& m) {
       .def_rw("path", &SimRequest::path)
       .def_rw("fault", &SimRequest::fault)
       .def_rw("duration_s", &SimRequest::duration_s)
-      .def_rw("seed", &SimRequest::seed)
-      .def_prop_rw(
-          "estimator", [](const SimRequest& r) { return r.choice.estimator; },
-          [](SimRequest& r, std::string name) { r.choice.estimator = std::move(name); })
-      .def_prop_rw(
-          "controller", [](const SimRequest& r) { return r.choice.controller; },
-          [](SimRequest& r, std::string name) { r.choice.controller = std::move(name); })
-      .def_prop_rw(
-          "fidelity", [](const SimRequest& r) { return r.choice.fidelity; },
-          [](SimRequest& r, std::string name) { r.choice.fidelity = std::move(name); })
-      .def_prop_rw(
-          "attitude", [](const SimRequest& r) { return r.choice.attitude; },
-          [](SimRequest& r, std::string name) { r.choice.attitude = std::move(name); })
-      .def_prop_rw(
-          "compare", [](const SimRequest& r) { return r.choice.compare; },
-          [](SimRequest& r, bool compare) { r.choice.compare = compare; });
+      .def_rw("seed", &SimRequest::seed);
+  const auto choice = [&request](const char* name, auto member) {
+    request.def_prop_rw(
+        name, [member](const SimRequest& r) { return r.choice.*member; },
+        [member](SimRequest& r, std::decay_t<decltype(r.choice.*member)> value) {
+          r.choice.*member = std::move(value);
+        });
+  };
+  choice("estimator", &Choice::estimator);
+  choice("controller", &Choice::controller);
+  choice("fidelity", &Choice::fidelity);
+  choice("attitude", &Choice::attitude);
+  choice("compare", &Choice::compare);
 }
 
 }  // namespace
