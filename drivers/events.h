@@ -5,7 +5,6 @@
 #define EQUIPOISE_DRIVERS_EVENTS_H
 
 #include <linux/input.h>
-#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus

@@ -2,7 +2,6 @@
 #include "iio_imu.h"
 
 #include <errno.h>
-#include <math.h>
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>

@@ -3,7 +3,6 @@
 // Each robot is compiled once (robot_*.cpp). Simulation only.
 #pragma once
 
-#include <cstring>
 #include <functional>
 #include <map>
 #include <memory>

@@ -12,7 +12,6 @@
 namespace equipoise {
 
 enum class ArmState : std::int32_t { kDisarmed = 0, kArmed = 1, kFault = 2 };
-inline constexpr std::array<const char*, 3> kArmStateNames{"disarmed", "armed", "fault"};
 
 /// A row applies when the motors are (not) requested and the checks (do not) pass; the first that applies is
 /// taken, none keeps the state.

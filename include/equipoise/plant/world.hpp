@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "equipoise/actuate/bridge.hpp"
 #include "equipoise/imu_parts.h"
 #include "equipoise/plant/coulomb.hpp"
 #include "equipoise/plant/ground.hpp"

@@ -8,8 +8,8 @@
 #include <cstdio>
 
 #include "app/board/self_test.hpp"
-#include "app/cli/commands.hpp"
 #include "app/cli/interrupt.hpp"
+#include "app/text/errors.hpp"
 #include "bbb.h"
 #include "robots/robot_list.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include "app/cli/commands.hpp"
+#include "app/text/errors.hpp"
 
 namespace equipoise::app {
 namespace {

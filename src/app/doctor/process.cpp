@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "app/doctor/doctor.hpp"
-#include "equipoise/runtime/command_auth.hpp"
+#include "equipoise/runtime/command_key.hpp"
 #include "equipoise/runtime/realtime.hpp"
 
 namespace equipoise::app::doctor {

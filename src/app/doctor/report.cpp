@@ -5,7 +5,6 @@
 #include <fstream>
 
 #include "app/board/calibration_file.hpp"
-#include "app/cli/commands.hpp"
 #include "app/doctor/doctor.hpp"
 #include "app/text/version.hpp"
 

@@ -1,6 +1,5 @@
 // `equipoise bench`: what a tick costs here, and how punctually this machine wakes the loop.
 #include <linux/perf_event.h>
-#include <sys/ioctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 

@@ -3,8 +3,8 @@
 
 #include <stdexcept>
 
-#include "app/cli/commands.hpp"
 #include "app/guard/guard.hpp"
+#include "app/text/errors.hpp"
 #include "sysfs.h"
 
 namespace equipoise::app {

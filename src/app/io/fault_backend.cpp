@@ -1,7 +1,6 @@
 #include "app/io/fault_backend.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <limits>
 #include <utility>

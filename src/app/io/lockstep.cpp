@@ -12,7 +12,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "app/cli/commands.hpp"
+#include "app/text/errors.hpp"
 #include "equipoise/lockstep_motors_t.hpp"
 
 namespace equipoise::app {

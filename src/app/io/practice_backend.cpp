@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <limits>
 
+#include "app/text/errors.hpp"
+
 namespace equipoise::app {
 namespace {
 

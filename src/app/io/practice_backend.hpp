@@ -8,9 +8,7 @@
 #include <vector>
 
 #include "app/io/fault_backend.hpp"
-#include "app/text/errors.hpp"
 #include "equipoise/runtime/monotonic.hpp"
-#include "equipoise/types.hpp"
 
 namespace equipoise::app {
 

@@ -10,7 +10,6 @@
 
 #include "app/log/run_log.hpp"
 #include "app/text/json.hpp"
-#include "equipoise/types.hpp"
 
 namespace equipoise::app {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "app/cli/commands.hpp"
 #include "app/run/can_wire.hpp"
+#include "app/text/errors.hpp"
 #include "can.h"
 #include "serial.h"
 

@@ -79,12 +79,6 @@ class SimulatedRun : NoCopy {
   /// One tick; false when the run has ended.
   bool step();
 
-  /// What is asked for from the next tick on.
-  Script& script() noexcept { return options_.script; }
-  bool lost() const noexcept { return judge_.lost() || judge_.refused(); }
-
-  SimSummary summary() const;
-
  private:
   rio_t broken_as(const std::vector<PlannedFault>& faults, std::uint64_t seed);
   auto commands();

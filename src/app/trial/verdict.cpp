@@ -1,6 +1,5 @@
 #include "app/trial/verdict.hpp"
 
-#include <cmath>
 #include <cstdio>
 
 #include "app/text/format.hpp"

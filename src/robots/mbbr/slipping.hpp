@@ -65,7 +65,6 @@ MbbrFriction contact_friction(const Mat<6, 6>& response, const Vec<6>& free, con
 
 class MbbrSlipping {
  public:
-  using Velocities = Vec<8>;  // body, ball, ball's centre
   using Mass = Eigen::LLT<Mat<8, 8>>;
 
   MbbrSlipping(const MbbrParameters& robot, const MbbrFloorParams& floor) noexcept
