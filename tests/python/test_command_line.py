@@ -57,6 +57,17 @@ def test_helps_begin_alike(helps):
         assert text[0].isupper(), f"equipoise {' '.join(words)}: {text.splitlines()[0]}"
 
 
+def test_every_option_has_the_range_and_the_default_of_the_table(root, helps):
+    """A limit that moves is a change of behaviour: make it in tests/data/options.txt, too."""
+    found = {
+        " ".join([*words, *shown])
+        for words, text in helps.items()
+        for shown in re.findall(r"^  (?:-\w,)?(--\S+) \S+ in (\[.*?\])(=?\S*)", text, re.M)
+    }
+    table = {line.strip() for line in (root / "tests/data/options.txt").read_text().splitlines()}
+    assert {" ".join(each.split()) for each in found} ^ table == set()
+
+
 def test_every_command_and_option_is_in_the_manual(binary, helps, tmp_path):
     assert run(binary, "man", "--out", tmp_path).returncode == 0
     pages = {page.name: page.read_text().replace("\\-", "-") for page in tmp_path.iterdir()}

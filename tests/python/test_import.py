@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 
+import equipoise as types
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,7 +92,10 @@ def test_a_table_becomes_a_log_that_everything_reads(root, table, tmp_path):
     np.testing.assert_allclose(log.sensors()["gyro_B_rad_s"], original.sensors()["gyro_B_rad_s"], atol=1e-9)
     of = [tomllib.loads(each.run.config_toml) for each in (log, original)]
     assert of[0]["robot"] == of[1]["robot"]
-    channels = {event.channel for event in lcm.EventLog(str(out["log"]))}
+    events = {event.channel: event for event in lcm.EventLog(str(out["log"]))}
+    end = types.verdict_t.decode(events["EQUIPOISE_VERDICT"].data)
+    assert end.duration_s == pytest.approx(len(log.sensors()) / 200) and np.isnan(end.fell_at_s)
+    channels = set(events)
     assert {"EQUIPOISE_RUN", "EQUIPOISE_SENSORS", "EQUIPOISE_MOTORS"} <= channels
     run("convert", out["log"], "--to", "mcap", "--out", tmp_path / "a.mcap")
     assert "--shadow" in run("replay", out["log"], status=2).stderr
@@ -110,6 +114,7 @@ def test_a_table_becomes_a_log_that_everything_reads(root, table, tmp_path):
         ({"columns": {"wheels": ["e1", "e0"]}}, "gyro_z_wheels", "the wheels are swapped"),
         ({"columns": {"drive": ["d1", "d0"]}}, "drive_wheels_turn", "the drive's columns are swapped"),
         ({"columns": {"drive": ["-d0", "-d1"]}}, "drive_wheels", "the sign of drive or wheels is flipped"),
+        ({"units": {"wheels": "rev"}}, "drive_wheels", "drive.unit, drive.kind or wheels.unit is wrong"),
     ],
 )
 def test_a_mistake_in_the_map_is_named(root, table, tmp_path, changes, check, named):
