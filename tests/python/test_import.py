@@ -10,6 +10,7 @@ import equipoise as types
 import numpy as np
 import pandas as pd
 import pytest
+from driven import rewritten
 from equipoise_robot import Log
 from equipoise_tools.paths import binary
 from scipy.io import savemat
@@ -265,3 +266,20 @@ def test_real_logs_pass_their_checks(root, tmp_path, name):
     shadow = json.loads(run("replay", log, "--shadow", "--json", "-").stdout)
     assert shadow["judged_s"] > 1
     assert shadow["ahead"]["100ms"]["wheel"] < shadow["ahead"]["100ms"]["persistence"]["wheel"]
+
+
+def test_samples_that_are_none_are_no_noise(root, log, tmp_path):
+    """Every fiftieth sample is invalid and nonsense: the noise is that of the others."""
+    ticks = iter(range(10**9))
+
+    def spoil(message):
+        if type(message).__name__ == "sensors_t" and next(ticks) % 50 == 49:
+            message.valid &= ~1
+            message.gyro_counts, message.accel_counts = [9e3] * 3, [9e3] * 3
+
+    spoiled = rewritten(tmp_path / "spoiled.lcm", log, spoil)
+    noise = [
+        json.loads(run("replay", each, "--shadow", "--json", "-").stdout)["noise"] for each in (log, spoiled)
+    ]
+    for of in noise[0]:
+        assert noise[1][of]["log"] == pytest.approx(noise[0][of]["log"], rel=0.2), of

@@ -92,6 +92,34 @@ TEST(IdentifyFriction, RecoversInertiaAndFrictionWithinTwoPercent) {
   EXPECT_GT(found.r_squared, 0.9);
 }
 
+/// A flywheel that moves by the formula, without noise: nothing is left of rounding by windows.
+TEST(IdentifyFriction, IsExactForWhatItsFormulaSays) {
+  const double ratio = 1.25, inertia = 1.5e-3, coulomb = 0.05, viscous = 0.003;
+  FrictionRig r;
+  r.flywheel_over_ball_radius = ratio;
+  const double w = 2.0 * kPi * 0.4;
+  BenchLog log;
+  for (int k = 0; k < 4000; ++k) {
+    const double t = 0.005 * k;
+    const double between = t - 0.0025;  // a row's command held since the one before
+    const double rate = 30.0 * std::sin(w * between);
+    const double torque = inertia * 30.0 * w * std::cos(w * between) / ratio + std::copysign(coulomb, rate) +
+                          (viscous + r.k2_ball_N_m_s) * ratio * rate;
+    log.rows.push_back({t, torque / r.k1_N_m, 0.0, 12.0, 30.0 / w * (1.0 - std::cos(w * t))});
+  }
+  const Identified found = identify_friction(log, r);
+  ASSERT_EQ(found.refused, "");
+  EXPECT_LT(off(found, "flywheel_inertia_kg_m2", inertia), 2e-3);
+  EXPECT_LT(off(found, "coulomb_friction_N_m", coulomb), 2e-3);
+  EXPECT_LT(off(found, "viscous_friction_N_m_s", viscous), 5e-3);
+  r.flywheel_over_ball_radius = NAN;
+  EXPECT_THAT(identify_friction(log, r).refused, HasSubstr("--radius-ratio"));
+  log.radius_ratio = ratio;  // it says so itself
+  EXPECT_LT(off(identify_friction(log, r), "flywheel_inertia_kg_m2", inertia), 2e-3);
+  for (BenchSample& row : log.rows) row.u = -row.u;
+  EXPECT_THAT(identify_friction(log, r).refused, HasSubstr("accelerates against the command"));
+}
+
 TEST(IdentifyFriction, TellsTheDirectionsApart) {
   FrictionRigParams p;
   p.negative_scale = 1.3;
