@@ -21,6 +21,11 @@ struct Fault {
 
 const Fault kFaults[] = {
     {"tilt", kTilt, 1, [](SafetyInputs& in, MotorCommand&) { in.state.theta_rad.x() = 0.61; }},
+    {"tilt_on_its_way_back", kTilt, 1,
+     [](SafetyInputs& in, MotorCommand&) {
+       in.state.theta_rad.x() = 0.61;
+       in.state.omega_B_rad_s.x() = -2.0;
+     }},
     {"falling", kTilt, 1,
      [](SafetyInputs& in, MotorCommand&) {
        in.state.theta_rad.x() = -0.3;
