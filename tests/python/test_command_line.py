@@ -122,6 +122,9 @@ def test_manual_pages_are_clean_roff(binary, tmp_path):
         ("sim --config FILE --set controller.thesis.gain[2].c1=1", "did you mean controller.thesis.gains?"),
         ("sim --config FILE --set controller.thesis.gains[2].c9=1", "no such key"),
         ("sim --config FILE --set controller.thesis.gains[99].c1=1", "gains has "),
+        ("sim --config FILE --telemetry file:a.lcm", "a file is no link; --log FILE writes one"),
+        ("run --config FILE --command-url tcpq://a", "ends the program when its server does; use udpm"),
+        ("send --key FILE --url file:a.lcm --disarm", "a file is no link"),
     ],
 )
 def test_a_slip_is_named_in_one_line(binary, root, arguments, said):
