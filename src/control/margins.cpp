@@ -23,8 +23,7 @@ std::vector<double> frequency_grid(double period_s, int points_per_sign, double 
   double w = first;
   for (int i = 0; i < points_per_sign; ++i, w *= ratio) {
     for (const double at : {w, -w, centre_rad_s + w, centre_rad_s - w}) {
-      if (std::abs(at) <= last * (1.0 + 1e-9) && (centre_rad_s != 0.0 || std::abs(at) == w))
-        grid.push_back(at);
+      if (std::abs(at) <= last * (1.0 + 1e-9)) grid.push_back(at);
     }
   }
   std::sort(grid.begin(), grid.end());

@@ -132,6 +132,23 @@ TEST_P(SafetyFault, WithoutItTheMotorsStayOn) {
 INSTANTIATE_TEST_SUITE_P(Every, SafetyFault, ::testing::ValuesIn(kFaults),
                          [](const auto& test) { return test.param.name; });
 
+/// Counted from a robot's first tick on, before it was ever armed.
+TEST(Safety, WhatIsWrongFromTheStartIsNotCountedLonger) {
+  for (const char* name : {"attitude", "battery_low", "battery_cutoff", "battery_unknown", "estimator",
+                           "slip", "picked_up", "dropped", "bridge"}) {
+    const auto* fault = std::find_if(std::begin(kFaults), std::end(kFaults),
+                                     [name](const Fault& f) { return f.name == std::string(name); });
+    Safety safety(params());
+    SafetyInputs in = well();
+    in.arm_requested = false;
+    MotorCommand command = half();
+    fault->cause(in, command);
+    int ticks = 1;
+    while ((void)safety.gate(command, in), (safety.reasons() & fault->reason) == 0 && ticks < 1000) ++ticks;
+    EXPECT_EQ(ticks, fault->in_ticks) << name;
+  }
+}
+
 SafetyInputs late(int ticks) {
   SafetyInputs in = well();
   in.bridges_gaps = true;

@@ -9,6 +9,9 @@ namespace {
 TEST(Degraded, EveryBitHasARowAndExcludedSensorsAreSome) {
   EXPECT_EQ(kGyroBiasJumped, 1U << (kDegradedModes.size() - 1));
   EXPECT_EQ(kSensorsLeftOut, 0xF8U);
+  EXPECT_EQ(kWithoutImu, 1U);
+  EXPECT_EQ(kWithoutEncoders, 2U);
+  EXPECT_EQ(kEstimatorInDoubt, 4U);
 }
 
 TEST(Degraded, WithoutWhatItBalancesByItStands) {

@@ -134,6 +134,9 @@ TEST(DutyBudget, WithoutRoomForMotionThereIsNone) {
   DutyBudget b;
   EXPECT_GT(b.allowed_speed(100.0), 1e9) << "unlimited unless told otherwise";
   EXPECT_EQ(b.allowed_yaw_rate(-100.0), -100.0);
+  b.share = 0.6;
+  EXPECT_EQ(b.allowed_yaw_rate(-1e9), -1e9) << "who turns for nothing turns at will";
+  EXPECT_GT(b.allowed_speed(1e9), 1e9);
   b.share = 0.1;
   b.of_friction = 0.2;
   b.per_yaw_rate = b.per_speed = 0.5;
