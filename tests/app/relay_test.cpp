@@ -102,7 +102,7 @@ class Relay : public ::testing::Test {
       conversation.find_robots();
       found_ = true;
       try {
-        conversation.relay(requests);
+        arguments_.disarm ? conversation.disarm_all() : conversation.relay(requests);
       } catch (const std::exception& failure) {
         error_ = failure.what();
       }
@@ -121,7 +121,7 @@ class Relay : public ::testing::Test {
   /// The robot's loop, which does at once what it is told.
   Command tick() {
     const Command command = robot_->latest();
-    robot_->tell(command.arm ? ArmState::kArmed : ArmState::kDisarmed);
+    robot_->tell(command.arm || stays_on_ ? ArmState::kArmed : ArmState::kDisarmed);
     return command;
   }
   template <class Wanted>
@@ -180,6 +180,7 @@ class Relay : public ::testing::Test {
   int requests_[2] = {-1, -1};
   std::string device_;
   SendArguments arguments_;
+  bool stays_on_ = false;  // whatever it is told
   std::unique_ptr<CommandReceiver> robot_;
   std::atomic<bool> found_{false}, returned_{false};
   std::string error_;  // once it has returned
@@ -216,6 +217,15 @@ TEST_F(Relay, ADisarmIsCarriedOutThoughItsInputHasEnded) {
   close(requests_[1]);
   requests_[1] = -1;
   EXPECT_TRUE(soon([&] { return !tick().arm; }));
+}
+
+TEST_F(Relay, ADisarmIsSaidUntilTheMotorsAreOff) {
+  arguments_.disarm = stays_on_ = true;
+  start(kQuick, requests_[0]);
+  EXPECT_FALSE(soon([&] { return returned_.load(); }, 0.5));
+  stays_on_ = false;
+  EXPECT_TRUE(soon([&] { return returned_.load(); }));
+  EXPECT_EQ(error_, "");
 }
 
 TEST_F(Relay, ALineWithoutEndEndsIt) {
