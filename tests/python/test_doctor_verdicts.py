@@ -84,3 +84,26 @@ def test_a_limit_is_enough_from_what_the_loop_needs_on(root, robot, limit, check
 def test_a_route_takes_the_group_where_its_mask_says_so(root, robot, route, there):
     write(robot / "proc/net/route", f"Iface Destination\n{route} 0 0 0\n")
     assert examine(root, robot)[0]["lcm.route"]["verdict"] == ("ok" if there else "warn")
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "check", "said"),
+    [
+        ("sys/class/pwm/pwmchip4/npwm", "1\n", "pwm.2", "has 1 channels, needs channel B"),
+        ("sys/class/pwm/pwmchip7/npwm", "0\n", "pwm.3", "has 0 channels, needs channel A"),
+        ("sys/class/pwm/pwmchip7/export", None, "pwm.3", "pwmchip7/export: No such file"),
+        (
+            "sys/bus/iio/devices/iio:device0/in_voltage6_raw",
+            None,
+            "battery.adc",
+            "in_voltage6_raw: No such file",
+        ),
+        ("sys/bus/counter/devices/counter1/count0/enable", None, "encoder.2", "No such file"),
+    ],
+)
+def test_a_device_that_lacks_something_fails_alone(root, robot, file, content, check, said):
+    (robot / file).unlink() if content is None else (robot / file).write_text(content)
+    checks, _ = examine(root, robot)
+    assert by_verdict(checks)["fail"] == {"imu.bus", check}
+    assert said in checks[check]["what"] and checks[check]["fix"]
+    assert checks["pwm.1"]["what"] == "EHRPWM at 48302200 channel A"

@@ -49,6 +49,13 @@ def test_motor_parameters_come_back_and_a_configuration_includes_them(brake_log,
     assert sha[0] != sha[1]
 
 
+def test_a_seed_is_another_bench():
+    first, again, other = (
+        json.loads(run(*BENCH, "--mode", "drive_brake", "--seed", seed).stdout)["rows"] for seed in (1, 1, 2)
+    )
+    assert first == again != other
+
+
 def changed_log(brake_log_csv, tmp_path, change):
     """The simulated bench's log as another sensor would have it."""
     table = pd.read_csv(brake_log_csv)
