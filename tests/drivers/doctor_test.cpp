@@ -20,7 +20,7 @@ class DoctorTest : public Testbed {
   Finding look(const std::string& name) {
     Findings findings;
     examine_buses(patient_, &findings);
-    for (const Finding& finding : findings.all()) {
+    for (const Finding& finding : findings) {
       if (finding.name == name) return finding;
     }
     return {name, Verdict::kSkipped, "not looked at", ""};
@@ -62,7 +62,7 @@ TEST_F(DoctorTest, LooksWithoutChangingTheChip) {
 TEST_F(DoctorTest, FindsEveryDeviceOfTheBoard) {
   Findings findings;
   examine_buses(patient_, &findings);
-  for (const Finding& finding : findings.all()) {
+  for (const Finding& finding : findings) {
     EXPECT_NE(finding.verdict, Verdict::kFail) << finding.name << ": " << finding.what;
   }
 }
