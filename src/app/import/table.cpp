@@ -9,6 +9,7 @@
 
 #include "app/text/errors.hpp"
 #include "app/text/files.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -132,8 +133,8 @@ Table read_table(const std::string& path, const TableShape& shape) {
   std::filesystem::path file(path);
   for (const char* other : {".mat", ".parquet", ".feather", ".h5", ".xlsx"})
     if (file.extension() == other)
-      throw InputError(path + ": is no text; make a CSV of it: ./tools/table " + path + " > " +
-                       file.replace_extension(".csv").string());
+      throw InputError(format("%s: is no text; make a CSV of it: ./tools/table %s > %s", path.c_str(),
+                              path.c_str(), file.replace_extension(".csv").c_str()));
   return shape.float32 ? read_float32_table(path, shape) : read_text_table(path, shape);
 }
 

@@ -93,7 +93,7 @@ std::string from_hex(const std::string& text, Section& s, const std::string& key
   std::array<std::uint8_t, kLongestFrame> bytes{};
   std::size_t size = 0;
   (void)sodium_hex2bin(bytes.data(), bytes.size(), text.data(), text.size(), nullptr, &size, nullptr);
-  const std::string frame(reinterpret_cast<const char*>(bytes.data()), size);
+  std::string frame(reinterpret_cast<const char*>(bytes.data()), size);
   if (frame.empty() || to_hex(frame) != text)
     s.fail(key, "\"" + text + "\": allowed: 1 to " + std::to_string(kLongestFrame) +
                     " bytes in hexadecimal, e.g. \"7e46\"");

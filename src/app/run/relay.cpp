@@ -90,7 +90,7 @@ class Lines {
 
 const char* word(std::int8_t state) {
   constexpr std::array<const char*, 4> kWords{"off", "waiting", "armed", "fault"};  // of command_session_t
-  const auto i = static_cast<std::size_t>(state);
+  const auto i = static_cast<std::uint8_t>(state);
   return i < kWords.size() ? kWords[i] : kWords[0];
 }
 
