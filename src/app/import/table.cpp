@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <initializer_list>
 #include <limits>
 
 #include "app/text/errors.hpp"
 #include "app/text/files.hpp"
-#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -131,10 +131,10 @@ Table read_float32_table(const std::string& path, const TableShape& shape) {
 
 Table read_table(const std::string& path, const TableShape& shape) {
   std::filesystem::path file(path);
-  for (const char* other : {".mat", ".parquet", ".feather", ".h5", ".xlsx"})
-    if (file.extension() == other)
-      throw InputError(format("%s: is no text; make a CSV of it: ./tools/table %s > %s", path.c_str(),
-                              path.c_str(), file.replace_extension(".csv").c_str()));
+  const std::initializer_list<const char*> others{".mat", ".parquet", ".feather", ".h5", ".xlsx"};
+  if (std::any_of(others.begin(), others.end(), [&](const char* other) { return file.extension() == other; }))
+    throw InputError(path + ": is no text; make a CSV of it: ./tools/table " + path + " > " +
+                     file.replace_extension(".csv").string());
   return shape.float32 ? read_float32_table(path, shape) : read_text_table(path, shape);
 }
 
