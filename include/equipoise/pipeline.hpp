@@ -189,8 +189,6 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.disturbance = health_.disturbance;
     in.left_out = t.degraded & kSensorsLeftOut;
     in.tilt_sigma_rad = health_.tilt_sigma_rad;
-    if (t.z.gyro_axis_ok[2] && !health_.gyro_left_out)
-      in.slip_rad_s = Robot::slip_rad_s(t.z, kinematics_, t.x_hat);
     in.saturated = t.saturated;
     in.all_finite = in.all_finite && t.u_friction.allFinite();
     in.bridges_gaps = health_.predicts_wheels;

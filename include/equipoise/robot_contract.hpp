@@ -55,8 +55,6 @@ struct RobotContract {
                 "Estimators::isolates(): the active estimator finds faulty encoders itself");
   static_assert(std::is_same_v<decltype(std::as_const(estimators()).reads_attitude()), bool>,
                 "Estimators::reads_attitude(): an estimator that runs needs the attitude source");
-  static_assert(std::is_same_v<decltype(Robot::slip_rad_s(sample(), kinematics(), x_hat())), double>,
-                "Robot::slip_rad_s(sample, kinematics, estimate): encoders against gyro; 0 where not judged");
   static_assert(std::is_same_v<decltype(reference().reset(x_hat())), void>,
                 "Reference::reset(estimate) starts from where the robot is");
   static_assert(std::is_same_v<decltype(Feedback::kSharesDuty), const bool>,

@@ -71,7 +71,6 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   const Vec2 falls = in.state.theta_rad.head<2>() + p_.fall_time_s * in.state.omega_B_rad_s.head<2>();
   const double nis = std::min(std::abs(in.state.normalized_innovation), kLargestInnovation);
   if (std::isfinite(nis)) innovation_ += kMean * (nis - innovation_);
-  if (std::isfinite(in.slip_rad_s)) slip_ += kMean * (in.slip_rad_s - slip_);
   // What was left out explains what was; what surprises after that is something else.
   if ((in.left_out & ~left_out_) != 0) innovation_ = 0.0;
   left_out_ = in.left_out;
@@ -92,7 +91,6 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   const bool still = in.gyro_bias_known && in.state.omega_B_rad_s.norm() <= p_.max_arm_rate_rad_s;
   if (!armed() && !still) reasons |= kGyroMoving;
   if (unhealthy_ || !(in.tilt_sigma_rad <= p_.max_tilt_sigma_rad)) reasons |= kEstimatorUnhealthy;
-  if (std::abs(slip_) > p_.max_slip_rad_s) reasons |= kWheelSlip;
   if (fast_ >= kFastTicks || falling_ >= kFallingTicks) reasons |= kPickedUp;
   return reasons;
 }

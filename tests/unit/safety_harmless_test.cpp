@@ -23,15 +23,12 @@ const Harmless kHarmless[] = {
        in.state.theta_rad.z() = 3.0;
        in.state.omega_B_rad_s.z() = 30.0;
      }},
-    {"bias", [](SafetyInputs& in, MotorCommand&) { in.bias_drift_rad_s = 0.1; }},
     {"motors", [](SafetyInputs& in, MotorCommand&) { in.disturbance = 2.0; }},
     {"tilt_sigma", [](SafetyInputs& in, MotorCommand&) { in.tilt_sigma_rad = 0.1; }},
     {"battery", [](SafetyInputs& in, MotorCommand&) { in.battery_V = 6.0; }},
     {"innovation", [](SafetyInputs& in, MotorCommand&) { in.state.normalized_innovation = -2.5; }},
     {"innovation_not_a_number",
      [](SafetyInputs& in, MotorCommand&) { in.state.normalized_innovation = NAN; }},
-    {"slip", [](SafetyInputs& in, MotorCommand&) { in.slip_rad_s = 7.9; }},
-    {"slip_not_a_number", [](SafetyInputs& in, MotorCommand&) { in.slip_rad_s = NAN; }},
     {"wheels",
      [](SafetyInputs& in, MotorCommand&) {
        in.wheel_rate_rad_s = {90.0, -90.0, 0.0, 0.0};

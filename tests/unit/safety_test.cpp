@@ -33,7 +33,6 @@ const Fault kFaults[] = {
      }},
     {"falling_not_a_number", kTilt, 1,
      [](SafetyInputs& in, MotorCommand&) { in.state.omega_B_rad_s.y() = NAN; }},
-    {"bias", kImuUntrusted, 1, [](SafetyInputs& in, MotorCommand&) { in.bias_drift_rad_s = 0.11; }},
     {"motors", kMotorFault, 1, [](SafetyInputs& in, MotorCommand&) { in.disturbance = 2.1; }},
     {"tilt_not_a_number", kTilt, 1, [](SafetyInputs& in, MotorCommand&) { in.state.theta_rad.y() = NAN; }},
     {"imu", kImuStale, 3, [](SafetyInputs& in, MotorCommand&) { in.imu_ok = false; }},
@@ -79,7 +78,6 @@ const Fault kFaults[] = {
        in.encoders_stuck = 1;
        in.encoders_reversed = 4;
      }},
-    {"slip", kWheelSlip, 5, [](SafetyInputs& in, MotorCommand&) { in.slip_rad_s = -20.0; }},
     {"picked_up", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.wheel_rate_rad_s[2] = -95.0; }},
     {"dropped", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.accel_m_s2 = 0.5; }},
     {"saturated", kSaturated, 101, [](SafetyInputs& in, MotorCommand&) { in.saturated = true; }},
@@ -135,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Every, SafetyFault, ::testing::ValuesIn(kFaults),
 /// Counted from a robot's first tick on, before it was ever armed.
 TEST(Safety, WhatIsWrongFromTheStartIsNotCountedLonger) {
   for (const char* name : {"attitude", "battery_low", "battery_cutoff", "battery_unknown", "estimator",
-                           "slip", "picked_up", "dropped", "bridge"}) {
+                           "picked_up", "dropped", "bridge"}) {
     const auto* fault = std::find_if(std::begin(kFaults), std::end(kFaults),
                                      [name](const Fault& f) { return f.name == std::string(name); });
     Safety safety(params());
@@ -236,7 +234,6 @@ TEST(Safety, ItsLimitsThemselvesAreAllowed) {
   in.disturbance = p.max_disturbance;
   in.battery_V = p.min_battery_V;
   in.wheel_rate_rad_s[1] = p.max_wheel_rate_rad_s;
-  in.slip_rad_s = p.max_slip_rad_s;
   Safety safety(p);
   for (int i = 0; i < 1000; ++i) ASSERT_TRUE(safety.gate(half(), in).enable) << safety.reasons();
 }

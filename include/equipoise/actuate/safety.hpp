@@ -51,12 +51,11 @@ struct SafetyParams {
   double max_innovation = 2.5;    // normalised innovation, mean over about ten ticks; back below a half: well
   double max_innovation_published = 20.0;  // the same for [T]'s own filter, which trusts itself more
   double max_innovation_s = 0.05;          // above it for longer
-  double encoder_check_drive = 0.3;   // shakes each wheel right after arming; 0: encoders are not checked
-  double encoder_probe_drive = 0.0;   // turns a robot whose encoders count nothing; 0: they are believed
-  double max_tilt_sigma_rad = 0.1;    // the tilt is not known any more
-  double max_bias_drift_rad_s = 0.1;  // of the gyro, against its mean over 20 s
-  double max_disturbance = 2.0;       // of u, as the estimator has it: motors that do not do as told
-  double max_slip_rad_s = 8.0;  // encoders against gyro, where the robot tells; mean over about ten ticks
+  double encoder_check_drive = 0.3;    // shakes each wheel right after arming; 0: encoders are not checked
+  double encoder_probe_drive = 0.0;    // turns a robot whose encoders count nothing; 0: they are believed
+  double max_tilt_sigma_rad = 0.1;     // the tilt is not known any more
+  double max_bias_drift_rad_s = 0.1;   // of the gyro, against its mean over 20 s
+  double max_disturbance = 2.0;        // of u, as the estimator has it: motors that do not do as told
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
   double max_saturated_s = 0.5;        // without a break
   double max_stall_s = 0.3;            // a wheel that stands still at nearly full duty
@@ -80,7 +79,6 @@ struct SafetyInputs {
   double tilt_sigma_rad = 0.0;    // the estimator's own; 0 where it does not tell
   double bias_drift_rad_s = 0.0;  // likewise
   double disturbance = 0.0;       // likewise
-  double slip_rad_s = 0.0;        // 0 where the robot cannot tell
   std::array<double, kMaxMotors> wheel_rate_rad_s{};
   std::uint32_t left_out = 0;  // bits of sensors that were found out and are not used any more
   bool saturated = false;
@@ -133,7 +131,6 @@ class Safety {
   int falling_ = 0;
   std::array<int, kMaxMotors> stalled_{};
   double innovation_ = 0.0;
-  double slip_ = 0.0;
   std::uint32_t left_out_ = 0;
   int surprised_ = 0;
   bool unhealthy_ = false;

@@ -13,7 +13,9 @@ namespace equipoise {
 
 struct EvidenceParams {
   double encoder_sigma_rad = 0.0;            // counts and play
+  double encoder_step_rad = 0.0;             // that a wheel may turn while its encoder stands still
   double wheel_step_rad = 0.0;               // that a wheel turns in a tick, at most
+  double slips = 0.0;                        // share of the wheels' samples
   std::array<double, 3> gyro_sigma_rad_s{};  // of what turns the body beside the model, at least
 };
 
@@ -21,6 +23,7 @@ struct SensorFaultsParams {
   EvidenceParams evidence;
   std::array<bool, 3> balances{};  // gyro axes without which the robot falls
   Vec3 axis_sign = Vec3::Ones();   // of the sensor's axis along each of the body's
+  bool bias_drifts = false;        // is a hypothesis
 
   /// One of these does.
   bool balance(std::uint32_t axes) const noexcept {
@@ -40,7 +43,8 @@ class Evidence {
   static constexpr std::size_t kWheelRow = static_cast<std::size_t>(Model::kWheel);
   static constexpr std::size_t kAccelRow = kWheelRow + static_cast<std::size_t>(Wheels);
 
-  explicit Evidence(const EvidenceParams& params) : p_(params) {}
+  explicit Evidence(const EvidenceParams& params)
+      : p_(params), log_still_(log_normal(0.0, std::pow(kModelError * params.encoder_sigma_rad, 2))) {}
 
   /// `sigma_rad_s`: of the gyro, while the robot was at rest.
   void reset(double sigma_rad_s) noexcept {
@@ -49,20 +53,24 @@ class Evidence {
     forget();
   }
   /// The samples before the next are not known.
-  void forget() noexcept { known_ = false; }
+  void forget() noexcept {
+    known_ = false;
+    stands_.fill(false);
+  }
 
   /// A tick's first: what is expected of the others, and its own.
   double expect(const Filter& f, const Sample& used, const Sample& came) noexcept {
     for (std::size_t row = 0; row < kRows; ++row) {
       faulty_[row] = log_faulty(row, came);
-      shaken_[row] = faulty_[row] + (row < 3 ? std::log(kShaken) : std::log(kFelt));
+      shaken_[row] = log_shaken(row);
+      stands_[row] = repeats(row, came);
     }
     double misfit = 0.0;
     shaken_most_ = 0.0;
     const double density = log_density(f, used, came, [&](std::size_t row, double peak, double says) {
-      peak_[row] = peak;
-      misfit += peak - says;
-      shaken_most_ += contaminated(row, peak) - peak;
+      peak_[row] = stands_[row] ? std::max(peak, log_still_) : peak;
+      misfit += peak_[row] - says;
+      shaken_most_ += std::max(shaken_[row] - peak_[row], 0.0);
     });
     expected_ = density + misfit;
     knows_less_ = !(density > kDiverged);
@@ -142,7 +150,7 @@ class Evidence {
       if (!axes[row] || !comes(used, row)) continue;
       const double v = spread(f, row);
       sum += log_normal(squared(f, row), v + sigma_rad_s * sigma_rad_s) -
-             contaminated(row, log_normal(squared(f, row), v));
+             std::max(log_normal(squared(f, row), v), shaken_[row]);
     }
     return std::min(sum, kOutlier);
   }
@@ -198,17 +206,24 @@ class Evidence {
   static constexpr double kWidened = 1.1;    // no tick makes it unsurer by itself
   static constexpr double kRounding = 0.25;  // nats, and that each filter has its own Jacobians
 
-  bool repeats(std::size_t row, const Sample& z) const noexcept {
-    return reading(z, row) == reading(before_, row);
+  bool repeats(std::size_t row, const Sample& came) const noexcept {
+    return row >= kWheelRow && row < kAccelRow && known_ && reading(came, row) == reading(before_, row);
   }
 
   static double log_normal(double squared, double variance) noexcept {
     return -0.5 * (std::log(2.0 * kPi * variance) + squared / variance);
   }
 
-  /// A sample of the IMU may be shaken: then it reads as a faulty one's would.
-  double contaminated(std::size_t row, double log_density) const noexcept {
-    return row < 3 || row >= kAccelRow ? std::max(log_density, shaken_[row]) : log_density;
+  /// Of what is used, whose innovation is as likely. An encoder that repeats itself errs as it did a tick
+  /// ago: it says how far its wheel has not turned. A gross sample reads as a faulty sensor's.
+  double log_healthy(const Filter& f, std::size_t row, double log_density) const noexcept {
+    double density = std::max(log_density, shaken_[row]);
+    if (stands_[row]) {
+      const double rate_rad_s = f.wheel_rate_rad_s()(static_cast<int>(row - kWheelRow));
+      const double turned = std::abs(rate_rad_s) * kTickS / p_.encoder_step_rad;
+      density = std::max(density, log_still_ + std::log(std::max(1.0 - turned, 0.0)));
+    }
+    return density;
   }
 
   /// Of the rows that came; those that are not used, as a faulty sensor has them. told(row, density of no
@@ -226,7 +241,7 @@ class Evidence {
       const double width = std::log(2.0 * kPi * variance);
       const double normal = -0.5 * (width + squared(f, row) / variance);
       if (!(normal > kDiverged)) return kDiverged;
-      const double density = contaminated(row, normal);
+      const double density = log_healthy(f, row, normal);
       sum += density;
       told(row, -0.5 * width, density);
     }
@@ -248,10 +263,9 @@ class Evidence {
       const double square = squared(f, row) / variance;
       if (!(square >= 0.0 && square < -kDiverged)) return kDiverged;
       const double area = 2.0 * kPi * variance;
-      const bool wheel = row >= kWheelRow && row < kAccelRow;
       // Is it no more than of a faulty sensor? log(x) < x / 8 + 1.1.
-      if (!wheel && square + 0.125 * area + 1.1 > -2.0 * shaken_[row]) {
-        sum += contaminated(row, -0.5 * (std::log(area) + square));
+      if (stands_[row] || square + 0.125 * area + 1.1 > -2.0 * shaken_[row]) {
+        sum += log_healthy(f, row, -0.5 * (std::log(area) + square));
       } else {
         squares += square;
         product *= area;
@@ -265,13 +279,24 @@ class Evidence {
     return std::max(sum + shaken_most_ + kRounding, 3.0 - kOutlier) + 0.05;  // log(1 + exp(-3)) < 0.05
   }
 
-  /// A faulty sensor reads anything in its range; half of the faulty encoders stand still.
-  double log_faulty(std::size_t row, const Sample& came) const noexcept {
+  /// A faulty sensor reads anything in its range.
+  double log_anything(std::size_t row) const noexcept {
     if (row < 3) return -std::log(2.0 * kGyroRange_rad_s);
     if (row >= kAccelRow) return -std::log(2.0 * kAccelRange_m_s2);
-    const bool stands = known_ && repeats(row, came);
-    const double still = stands ? 1.0 / (std::sqrt(2.0 * kPi) * kModelError * p_.encoder_sigma_rad) : 0.0;
-    return std::log(0.5 / (2.0 * p_.wheel_step_rad) + 0.5 * still);
+    return -std::log(2.0 * p_.wheel_step_rad);
+  }
+  /// Half of the faulty encoders stand still; one that stood a tick ago is one of these (Bayes). Before
+  /// stands_ is of this tick.
+  double log_faulty(std::size_t row, const Sample& came) const noexcept {
+    const double anything = std::exp(log_anything(row));
+    if (row < kWheelRow || row >= kAccelRow) return log_anything(row);
+    const double still = std::exp(log_still_);
+    const double stands = stands_[row] ? still / (still + anything) : 0.5;
+    return std::log((1.0 - stands) * anything + (repeats(row, came) ? stands * still : 0.0));
+  }
+  /// Of a gross sample of a healthy one. A wheel that slips turns as a faulty encoder's may.
+  double log_shaken(std::size_t row) const noexcept {
+    return log_anything(row) + std::log(row < 3 ? kShaken : row < kAccelRow ? p_.slips : kFelt);
   }
 
   double bounded(double log_density) const noexcept {
@@ -279,6 +304,7 @@ class Evidence {
   }
 
   EvidenceParams p_;
+  double log_still_;                      // of an encoder that repeats itself
   double vibration_ = 0.0;                // variance of the gyro
   std::array<double, 3> innovation_{};    // of the gyro, a tick ago
   double expected_ = 0.0;                 // log density of what is expected
@@ -287,7 +313,8 @@ class Evidence {
   std::array<double, kRows> variance_{};  // a tick ago
   bool knows_less_ = true;
   std::array<double, kRows> faulty_{};  // log densities, of this tick
-  std::array<double, kRows> shaken_{};  // of a sample of the IMU that is shaken
+  std::array<double, kRows> shaken_{};  // of a gross sample
+  std::array<bool, kRows> stands_{};    // an encoder, since the tick before
   Sample before_;                       // a tick ago
   bool known_ = false;
 };

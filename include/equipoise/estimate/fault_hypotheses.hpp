@@ -16,6 +16,7 @@ struct FaultHypothesis {
     kAxis,      // an axis of the gyro
     kSwap,      // two axes of the gyro exchanged
     kBias,      // the gyro's bias has jumped
+    kDrift,     // the gyro's bias drifts
     kImu,       // gyro and accelerometer
     kSpin,      // no fault: the ball has spun on the floor
     kSlip,      // no fault: wheels have slipped
@@ -53,7 +54,7 @@ struct FaultHypothesis {
 template <int Wheels, bool Rocks = Wheels == 2>
 constexpr auto fault_hypotheses() noexcept {
   constexpr int kPairs = Wheels * (Wheels - 1) / 2;
-  std::array<FaultHypothesis, static_cast<std::size_t>(2 * Wheels + kPairs + 3 + 3 + (Rocks ? 8 : 6))> all{};
+  std::array<FaultHypothesis, static_cast<std::size_t>(2 * Wheels + kPairs + 3 + 3 + (Rocks ? 9 : 7))> all{};
   std::size_t n = 0;
   for (int i = 0; i < Wheels; ++i) all[n++] = {FaultHypothesis::kWheel, 1U << i};
   for (int i = 0; i < Wheels; ++i) all[n++] = {FaultHypothesis::kReversed, 1U << i};
@@ -72,6 +73,7 @@ constexpr auto fault_hypotheses() noexcept {
     all[n++] = {FaultHypothesis::kRock, 1U << 1};
     all[n++] = {FaultHypothesis::kEvent, 0};
   }
+  all[n++] = {FaultHypothesis::kDrift, 0};
   return all;
 }
 
@@ -114,7 +116,8 @@ inline constexpr std::array<const char*, fault_hypotheses<4, true>().size()> kFa
     "push",
     "imu_noise",
     "rock",
-    "event"};
+    "event",
+    "gyro_drift"};
 static_assert(kFaultNames.size() <= 32, "FaultEvidence::verdicts has a bit for each");
 
 /// Of each hypothesis of a robot its row among kFaultNames.

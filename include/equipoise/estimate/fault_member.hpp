@@ -25,7 +25,7 @@ struct FaultMember {
   bool apart = false;  // it may know more than the filter that uses every sensor
   UsedSensors<Wheels> used{};
   double ratio = 0.0;       // log-likelihood, of the hypothesis over what is used, since it was last refuted
-  int since = 0;            // tick
+  int since = 0;            // tick: it gains
   bool from_start = false;  // not refuted since arming
   int returns = -1;         // row of an excluded sensor that may be healthy again
   double from = 0.0;        // what that read when the member began

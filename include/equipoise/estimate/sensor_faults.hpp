@@ -65,13 +65,11 @@ class SensorFaults {
     evidence_ = {-1, 0.0, kBound, -1, 0.0, false, ticks_++ == 0 ? 0 : evidence_.verdicts};
     ran_ = 2;
     const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
-    heard_ = used_.with_axes(rocking()).of(z);
-    goes_on_ = false;
     hear_vibration(control, {});
-    control.predict(u);
-    control.update(heard_);
+    used_.predict(control, u);
+    control.update(used_.with_axes(rocking()).of(z));
     if (!raw.imu_ok || !raw.encoders_ok) {  // nothing to weigh against each other
-      healthy_.predict(u);
+      used_.predict(healthy_, u);
       healthy_.update(used_.of(z));
       weigh_.forget();
       stale_ = true;
@@ -86,9 +84,6 @@ class SensorFaults {
 
   /// What the verdicts are compared with.
   const Filter& healthy() const noexcept { return healthy_; }
-  /// What the control's filter was corrected by, and that it then went on from another.
-  const Sample& heard() const noexcept { return heard_; }
-  bool goes_on() const noexcept { return goes_on_; }
   bool trusted() const noexcept { return trusted_ && gross_.trusted(); }
   std::uint32_t excluded_wheels() const noexcept { return used_.without_wheels; }
   bool gyro_axis_excluded() const noexcept {
@@ -111,14 +106,14 @@ class SensorFaults {
   using Used = UsedSensors<Wheels>;
   using Member = FaultMember<Filter, Wheels>;
   static constexpr auto kRows = fault_rows<Wheels>();
-  static constexpr bool kRocks = kHypotheses[kCount - 1].kind == FaultHypothesis::kEvent;
+  static constexpr bool kRocks = Wheels == 2;
   static constexpr std::uint32_t kAhead = 1U << 1;  // the gyro's axis about which it rocks
 
   // Decisions, in nats. A false alarm in ten hours of ticks and sixteen hypotheses: ln(7.2e6 * 16)
   // (Lorden 1971).
   static constexpr double kBound = 18.6;
   static constexpr double kMargin = 5.0;  // odds of 150 to 1
-  // A push or slip a minute, a fault in 100 hours; wiring is as much rarer again.
+  // A push or slip a minute, a fault in 100 hours; wiring is as much rarer again, and again in motion.
   static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
@@ -129,7 +124,6 @@ class SensorFaults {
   static constexpr double kBias_rad_s = 0.1;  // uncertain after a jump: the noise of one sample
 
   static Filter with_noise(Filter filter, const SensorFaultsParams& p) {
-    filter.let_encoders_slip(false);  // slipping is a hypothesis of its own
     for (std::size_t i = 0; i < 3; ++i)
       filter.set_row_noise(i, std::max(filter.row_noise(i), std::pow(p.evidence.gyro_sigma_rad_s[i], 2)));
     for (std::size_t i = Evidence::kWheelRow; i < Evidence::kAccelRow; ++i)
@@ -183,14 +177,14 @@ class SensorFaults {
   void advance_all(const Input& u, const Sample& z) noexcept {
     before_.adopt(healthy_);
     hear_vibration(healthy_, p_.evidence.gyro_sigma_rad_s);
-    healthy_.predict(u);
+    used_.predict(healthy_, u);
     predicted_.adopt(healthy_);
     const Sample used = used_.of(z);
     healthy_.update(used);
     const double as_used = weigh_.expect(healthy_, used, z);
     for (Member& m : members_) m.apart = m.apart || weigh_.knows_less();
     for (std::size_t i = 0; i < kCount; ++i) {
-      if (used_.leaves_open(kHypotheses[i])) advance(i, u, z, used, as_used);
+      if (open(kHypotheses[i])) advance(i, u, z, used, as_used);
     }
     weigh_.learn_vibration(healthy_, used);
   }
@@ -213,20 +207,23 @@ class SensorFaults {
       if (anew) return;
     } else {
       anew = anew || (h.healthy() && ticks_ - m.since > kEventTicks);
-      if (kRocks && anew && h.healthy()) members_[kCount - 1].keep(m);
+      if constexpr (kRocks) {
+        if (anew && h.healthy()) members_[fault_index<Wheels>(FaultHypothesis::kEvent)].keep(m);
+      }
       const double most = (anew ? 0.0 : m.ratio) + m.most(h, weigh_, all, z) - as_used;
       if (most <= -kMargin && (anew || !m.apart)) return m.refute(-kMargin);
     }
     ++ran_;
     if (h.kind != FaultHypothesis::kNoise) hear_vibration(m.filter, p_.evidence.gyro_sigma_rad_s);
     if (anew) begin(i, before_, predicted_);
-    if (!anew) m.settled().predict(u);
+    if (!anew) m.used.predict(m.settled(), u);
     m.allow(h);
     const Sample used = m.used.of(z);
     m.innovate(used);
     double gain = weigh_(m.filter, used, z) - as_used;
     if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
     m.ratio += gain;
+    if (!(m.ratio > 0.0)) m.since = ticks_;
     if (!(m.ratio > -kMargin)) m.refute(-kMargin);
     if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < weigh_.least_jump_rad_s()) m.refute(-kMargin);
   }
@@ -268,36 +265,36 @@ class SensorFaults {
     evidence_.verdicts = verdicts;
   }
 
-  enum Consequence { kNone = -1, kStop = -2 };  // else the hypothesis' own
+  enum Consequence { kNone = -1, kStop = -2, kFollow = -3 };  // else the hypothesis' own
   int consequence(std::size_t i) const noexcept {
     const FaultHypothesis& h = kHypotheses[i];
     if (h.healthy()) return kNone;
     const bool gyro = h.kind == FaultHypothesis::kSwap ||
                       (h.kind == FaultHypothesis::kAxis && (used_.without_axes & h.mask) == 0);
     if ((gyro && p_.balance(h.mask)) || h.kind == FaultHypothesis::kImu) return kStop;
+    if (h.kind == FaultHypothesis::kBias || h.kind == FaultHypothesis::kDrift) return kFollow;
     return h.kind == FaultHypothesis::kReversed ? h.first() : static_cast<int>(i);  // as kWheel
   }
-  /// Two axes of the gyro that do not balance.
-  bool can_wait(const FaultHypothesis& wiring) const noexcept {
-    return wiring.kind == FaultHypothesis::kSwap && !p_.balance(wiring.mask);
-  }
-  /// Whatever is read wrongly could as well be left out; what can wait, does so until each axis could.
-  bool left_out_explains(const FaultHypothesis& wiring) const noexcept {
-    const auto out = wiring.kind == FaultHypothesis::kSwap ? FaultHypothesis::kAxis : FaultHypothesis::kWheel;
-    std::size_t explained = 0;
+  /// Leaving out each axis that is read wrongly.
+  bool left_out_explains(const FaultHypothesis& swap) const noexcept {
     for (std::size_t i = 0; i < kCount; ++i) {
-      const bool its = kHypotheses[i].kind == out && (kHypotheses[i].mask & wiring.mask) != 0;
-      explained += its && members_[i].ratio > 0.0 ? 1 : 0;
+      const bool its =
+          kHypotheses[i].kind == FaultHypothesis::kAxis && (kHypotheses[i].mask & swap.mask) != 0;
+      if (its && !(members_[i].ratio > 0.0)) return false;
     }
-    return explained >= (can_wait(wiring) ? 2 : 1);
+    return true;
+  }
+  bool open(const FaultHypothesis& h) const noexcept {
+    return used_.leaves_open(h) && (p_.bias_drifts || h.kind != FaultHypothesis::kDrift);
   }
   double weighed(std::size_t i) const noexcept {
     const FaultHypothesis& h = kHypotheses[i];
-    if (!used_.leaves_open(h)) return -kMargin;
-    const bool from_start = members_[i].from_start && !can_wait(h);
-    if (h.wiring() && !from_start && !left_out_explains(h)) return -kMargin;
-    if (h.wiring()) return members_[i].ratio - kEventPrior;
-    return members_[i].ratio + (h.healthy() && ticks_ - event_at_ > kEventTicks ? kEventPrior : 0.0);
+    if (!open(h)) return -kMargin;
+    const Member& m = members_[i];
+    const bool can_wait = h.kind == FaultHypothesis::kSwap && !p_.balance(h.mask);
+    if (can_wait) return left_out_explains(h) ? m.ratio - kEventPrior : -kMargin;
+    if (h.wiring()) return m.ratio - (m.from_start ? 1.0 : 2.0) * kEventPrior;
+    return m.ratio + (h.healthy() && ticks_ - event_at_ > kEventTicks ? kEventPrior : 0.0);
   }
 
   void decide(Filter& control) noexcept {
@@ -324,7 +321,8 @@ class SensorFaults {
     }
     if (leads == kNone) return happened(best, control);
     // One encoder or two? What holds for two had better not be taken for one.
-    const bool nested = kHypotheses[runner_up].kind == FaultHypothesis::kWheels;
+    const bool nested = kHypotheses[best].kind <= FaultHypothesis::kWheels &&
+                        kHypotheses[runner_up].kind == FaultHypothesis::kWheels;
     if (weight[best] - second < (nested ? 2.0 : 1.0) * kMargin) {
       if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) stop(best, runner_up);
       return;
@@ -332,13 +330,9 @@ class SensorFaults {
     if (kHypotheses[best].lasts(leads == kStop) && leads_for_ < kPatience) return;
     if (leads == kStop) return stop(best, best);
     use(best);
-    go_on(control);
+    control.adopt(healthy_);
   }
 
-  void go_on(Filter& control) noexcept {
-    control.adopt(healthy_);
-    goes_on_ = true;
-  }
   /// One of them is true; the robot cannot go on with either.
   void stop(std::size_t one, std::size_t other) noexcept {
     evidence_.leading = kRows[one];
@@ -353,7 +347,7 @@ class SensorFaults {
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].settled());
     if (kRocks ? !kHypotheses[event].pushes() : kHypotheses[event].kind == FaultHypothesis::kNoise)
-      go_on(control);
+      control.adopt(healthy_);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.depart(ratio, -kMargin);
     begin(event, healthy_);
@@ -387,11 +381,10 @@ class SensorFaults {
   Filter predicted_;  // without this tick's samples
   std::array<Member, kCount> members_;
   Used used_;
-  Sample heard_;
   FaultEvidence evidence_;
   std::array<double, 3> quiet_{};  // the gyro's variances
   bool stale_ = true;              // members have missed a tick
-  bool trusted_ = true, suspects_ = false, goes_on_ = false;
+  bool trusted_ = true, suspects_ = false;
   int ticks_ = 0, jumps_ = 0, ran_ = 1;  // since arming; filters in this tick
   int mirrored_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
   std::size_t leader_ = 0;

@@ -52,6 +52,9 @@ class TimeBase {
     known_.front() = known;
   }
 
+  /// Since the tick before.
+  bool stands(int wheel) const noexcept { return angles_[0](wheel) == angles_[1](wheel); }
+
   /// Mean input over the filter's last tick, which ended `age` ago.
   Input acted() const noexcept { return (1.0 - part_) * input(0) + part_ * input(1); }
 

@@ -13,6 +13,8 @@ namespace equipoise {
 /// Which samples are used, and how they are read.
 template <int Wheels>
 struct UsedSensors {
+  static constexpr double kDrift_rad_s = 0.007;  // in a tick: 0.1 rad/s in a second, as a bias that jumps
+
   std::uint32_t without_wheels = 0;  // bits
   std::uint32_t backwards = 0;       // of these: wiring, they do not return
   std::uint32_t without_axes = 0;    // of the gyro
@@ -21,6 +23,7 @@ struct UsedSensors {
   int reversed = -1;                 // a wheel that counts backwards
   double mirror_rad = 0.0;           // since it stood there
   bool imu = true;
+  bool drifts = false;                           // the gyro's bias
   Vec3 bias_rad_s = Vec3::Zero();                // of the gyro, since it jumped
   Vec<Wheels> offset_rad = Vec<Wheels>::Zero();  // of encoders that came back
   Measurement<Wheels> of(const Measurement<Wheels>& z) const noexcept {
@@ -43,6 +46,13 @@ struct UsedSensors {
     return s;
   }
 
+  /// Between two ticks.
+  template <class Filter>
+  void predict(Filter& filter, const Vec<Filter::Model::kInputs>& u) const noexcept {
+    filter.predict(u);
+    if (drifts) filter.doubt_bias(kDrift_rad_s);
+  }
+
   UsedSensors with_axes(std::uint32_t axes) const noexcept {
     UsedSensors u = *this;
     u.without_axes &= ~axes;
@@ -62,6 +72,7 @@ struct UsedSensors {
     if (h.kind == FaultHypothesis::kReversed) return (backwards & h.mask) != 0;
     if (h.kind == FaultHypothesis::kAxis) return (without_axes & h.mask) != 0;
     if (h.kind == FaultHypothesis::kSwap) return swapped == h.mask;
+    if (h.kind == FaultHypothesis::kDrift) return drifts;
     return h.kind == FaultHypothesis::kBias && !bias_rad_s.isZero(0.0);
   }
 
@@ -73,7 +84,8 @@ struct UsedSensors {
     return !encoders || (without_wheels & h.mask) == 0;
   }
 
-  /// A hypothesis turns over what is used of its sensors: an excluded one may be healthy again.
+  /// A hypothesis turns over what is used of its sensors: an excluded one may be healthy again, a bias
+  /// steady.
   UsedSensors turned_over(const FaultHypothesis& h) const noexcept {
     UsedSensors u = *this;
     if (h.kind == FaultHypothesis::kWheel) u.without_wheels ^= h.mask;
@@ -83,6 +95,7 @@ struct UsedSensors {
     if (h.kind == FaultHypothesis::kRock) u.without_axes |= h.mask;
     if (h.kind == FaultHypothesis::kSwap) u.swapped = h.mask;
     if (h.kind == FaultHypothesis::kImu) u.imu = false;
+    if (h.kind == FaultHypothesis::kDrift) u.drifts = !drifts;
     return u;
   }
 };

@@ -99,7 +99,7 @@ const std::vector<Reason>& safety_reasons() {
       {kStall, "stall", "a wheel is driven hard and does not turn for safety.max_stall_s", "free the wheel"},
       {kSaturated, "saturated", "motors at their limit for longer than safety.max_saturated_s",
        "charge the battery; lower the speed"},
-      {kWheelSlip, "wheel_slip", "wheels and body disagree by more than safety.max_slip_rad_s",
+      {kWheelSlip, "wheel_slip", "wheels and body disagreed; logs of 0.1 only",
        "clean floor, ball and wheels"},
       {kEncoderJump, "encoder_jump", "counts jump by more than a wheel can turn",
        "keep the cable away from motor leads; check pull-ups"},

@@ -46,7 +46,7 @@ class FaultTolerant {
     if (!params_.detection) return h;
     report(faults_, &h);
     if (faults_.suspects()) return h;  // a fault may explain what the filter has made of it: a bias, a torque
-    h.bias_drift_rad_s = bias_drift_.distance();
+    h.bias_drift_rad_s = bias_drift_.distance_rad_s();
     h.disturbance = ekf_.disturbance().norm();
     return h;
   }
@@ -84,7 +84,8 @@ class FaultTolerant {
     }
     const int jumps = faults_.bias_jumps();
     faults_.step(ekf_, u, z, omega_B);
-    if (faults_.bias_jumps() != jumps) bias_drift_.excuse(bias_drift_.kFoundAnew_rad_s);
+    if (faults_.bias_jumps() != jumps) bias_drift_.jumped();
+    bias_drift_.update(faults_.healthy().gyro_biases());
   }
 
   Params params_;

@@ -232,7 +232,9 @@ void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
       imu && axis[0], imu && axis[1], imu && axis[2], wheel[0], wheel[1], wheel[2], imu, imu};
   filter_.innovate(time_.acted(), y, use);
   const auto counts = [this](const Vec3& wheels) { return kinematics_.ball_from_wheels(wheels); };
-  if (encoders_slip_ && widen_by_slip<3>(filter_, Model::kWheel, Model::kE, slips, counts))
+  // What stands still does not slip: it is stuck, or its encoder is dead.
+  const auto widens = [this](int i, double nis) { return time_.stands(i) ? 1.0 : slips(nis); };
+  if (widen_by_slip<3>(filter_, Model::kWheel, Model::kE, widens, counts))
     filter_.weigh_again(time_.acted(), y, use);
 }
 

@@ -104,9 +104,6 @@ class MbbrEkf {
   Vec3 wheel_rate_rad_s() const noexcept;
   Vec3 wheel_angle_rad() const noexcept;
 
-  /// A wheel's encoder may turn alone: encoder_slip.hpp. Its faults then leave no trace but innovations.
-  void let_encoders_slip(bool slip) noexcept { encoders_slip_ = slip; }
-
   /// A force at the body's centre of mass acted in the predicted tick.
   void allow_push(double sigma_N) noexcept;
   /// The ball has spun on the floor in it.
@@ -144,7 +141,6 @@ class MbbrEkf {
   Filter filter_;
   Vec2 per_push_;  // change of tilt and ball rate in a tick, per N
   TimeBase<3, 3> time_;
-  bool encoders_slip_ = true;
   double gyro_bias_z_ = 0.0;
   double heading_ = 0.0;
   Turn direction_{0.0};  // of it

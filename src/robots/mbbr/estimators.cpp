@@ -3,12 +3,6 @@
 namespace equipoise {
 namespace {
 
-constexpr double kMountError_rad = 0.0016;  // that is left when the filter has learnt the mount
-// A ball that held and lets go turns the body by 2 rad/s in 0.1 s; the filter then moves the bias by up to
-// 0.06 rad/s.
-constexpr double kSuddenTurn_rad = 0.02;
-constexpr double kLately_s = 0.1;
-
 template <class Filter, std::size_t M>
 void step(Filter& filter, const Vec3& u, const Vec<static_cast<int>(M)>& y,
           const std::array<bool, M>& use) noexcept {
@@ -24,8 +18,11 @@ SensorFaultsParams sensor_faults(const MbbrEstimatorParams& params) {
   SensorFaultsParams p;
   p.balances = {true, true, false};
   p.axis_sign = params.gyro_axis_sign;
+  p.bias_drifts = true;
   p.evidence.encoder_sigma_rad = 0.012;
+  p.evidence.encoder_step_rad = 2.0 * kPi / 720.0;
   p.evidence.wheel_step_rad = kTickS * no_load_rad_s;
+  p.evidence.slips = 0.5;  // as many as of the faulty encoders turn: no verdict comes from turning
   return p;
 }
 
@@ -39,18 +36,13 @@ MbbrEstimators::MbbrEstimators(const Params& params)
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()
                               : MbbrLinearModel(params.robot, params.kf_yaw_transport),
-          params.kf),
-      rolling_(ekf_) {
-  rolling_.let_encoders_slip(false);
-}
+          params.kf) {}
 
 void MbbrEstimators::start(const Mbbr::Sample& z) noexcept {
   const Vec2 tilt = rest_tilt_.update(z.accel_B_m_s2);
   const Vec3 phi_B = kinematics_.ball_from_wheels(z.wheel_angle_rad);
 
   start_filter(tilt, z);
-  rolling_.adopt(ekf_);
-  turned_lately_rad_s_ = 0.0;
 
   Vec<13> x13 = Vec<13>::Zero();
   x13.head<2>() = tilt;
@@ -77,7 +69,6 @@ void MbbrEstimators::start_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_
   rest_bias_.tell(gyro_bias_B_rad_s);
   start(z);
   start_filter_moving(tilt_rad, gyro_bias_B_rad_s, z);
-  rolling_.adopt(ekf_);
 }
 
 /// Heading and inertial ball angles, [T] (6.3)-(6.4).
@@ -90,18 +81,7 @@ void MbbrEstimators::integrate(Id id, double heading_rate) noexcept {
 void MbbrEstimators::step_ekf(const Mbbr::Sample& z, const Vec3& u) noexcept {
   MbbrEstimate& x = at(Id::kEkf);
   step_filter(z, u, x.omega_B);
-  if (params_.detection) watch_bias(u, x.omega_B.z());
   x = ekf_.estimate();
-}
-
-/// What is left of the IMU's mount error makes a bias of the rate that the robot turns with.
-void MbbrEstimators::watch_bias(const Vec3& u, double turns_rad_s) noexcept {
-  rolling_.predict(u);
-  rolling_.update(faults_.heard());
-  if (faults_.goes_on()) rolling_.adopt(ekf_);
-  turned_lately_rad_s_ += kTickS / kLately_s * (turns_rad_s - turned_lately_rad_s_);
-  bias_drift_.update(rolling_.gyro_biases(), kMountError_rad * std::abs(turns_rad_s),
-                     kSuddenTurn_rad * std::abs(turns_rad_s - turned_lately_rad_s_));
 }
 
 const MbbrEstimate& MbbrEstimators::update(const Mbbr::Sample& z, const Vec3& u, bool held) noexcept {

@@ -54,14 +54,11 @@ class MbbrEstimators : public FaultTolerant<Mbbr, MbbrEkf, MbbrEstimatorParams, 
   }
   void published(const Mbbr::Sample& z, const Vec3& u) noexcept;
   void step_ekf(const Mbbr::Sample& z, const Vec3& u) noexcept;
-  void watch_bias(const Vec3& u, double turns_rad_s) noexcept;
   void integrate(Id id, double heading_rate) noexcept;
 
-  double turned_lately_rad_s_ = 0.0;  // about z
   KalmanFilter<MbbrPublishedModel> ekf13_published_;
   KalmanFilter<MbbrModel13> ekf13_;
   KalmanFilter<MbbrLinearModel> kf_;
-  MbbrEkf rolling_;                // without slip, which would hide a bias that drifts
   double attitude_heading_ = 0.0;  // continuous heading of the attitude source
 };
 

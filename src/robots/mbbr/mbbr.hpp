@@ -109,21 +109,6 @@ struct Mbbr {
   using Kinematics = MbbrKinematics;
   using Estimate = MbbrEstimate;
   using Sample = Measurement<kWheels>;
-
-  /// (R^T omega)_z of a ball that does not spin about the vertical, for small tilts.
-  static double vertical_spin_rad_s(const MbbrEstimate& x) noexcept {
-    return x.phi_dot_star.x() * x.theta_xy.y() - x.phi_dot_star.y() * x.theta_xy.x();
-  }
-
-  /// The ball does not spin about the vertical: (R^T omega)_z - Omega_z must be what the encoders say.
-  static double slip_rad_s(const Sample& z, const MbbrKinematics& kinematics,
-                           const MbbrEstimate& x) noexcept {
-    return slip_rad_s(z.wheel_rate_rad_s, z.gyro_B_rad_s.z(), kinematics, vertical_spin_rad_s(x));
-  }
-  static double slip_rad_s(const Vec3& wheel_rates, double gyro_z_rad_s, const MbbrKinematics& kinematics,
-                           double vertical_spin_rad_s) noexcept {
-    return kinematics.ball_from_wheels(wheel_rates).z() - (vertical_spin_rad_s - gyro_z_rad_s);
-  }
 };
 
 /// Robot-neutral view.

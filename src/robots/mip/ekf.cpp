@@ -30,7 +30,7 @@ constexpr double kMovingAngleVariance = 0.02 * 0.02;
 
 /// Beyond one standard deviation an innovation corrects no more than one of just that (Huber 1965): the gyro
 /// alone tells the tilt, but wheels that have left the ground are to be seen.
-double slips(double nis) noexcept { return std::sqrt(nis); }
+double slips(int /*wheel*/, double nis) noexcept { return std::sqrt(nis); }
 
 }  // namespace
 
@@ -181,7 +181,8 @@ MipEkf::MipEkf(const MipParameters& robot, const Params& params)
     : kinematics_(robot),
       filter_(Model(robot, params.options, params.disturbance_time_constant_s), params.filter,
               params.precision),
-      time_(params.sensor_age_s) {
+      time_(params.sensor_age_s),
+      encoders_slip_(params.options.encoders_slip) {
   const Model model(robot, params.options, params.disturbance_time_constant_s);
   const auto rates = [&model](double lean_rad, double u) {
     Model::Motion x_dot;

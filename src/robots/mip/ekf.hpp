@@ -18,6 +18,7 @@ struct MipEkfOptions {
   bool estimate_mount = true;
   bool know_lever_arm = true;      // the configured IMU position; false: at the centre of mass, as in [T]
   bool estimate_lever_arm = true;  // its y, starting from the above
+  bool encoders_slip = true;       // a wheel's may turn alone: encoder_slip.hpp
 };
 
 /// States of [T] (3.37), psi as counted by the encoders; mount angles about body x, y, z (sensor against
@@ -125,8 +126,6 @@ class MipEkf {
   static constexpr int kBiases = 1;  // of the gyro, that it estimates
   Vec<kBiases> gyro_biases() const noexcept { return filter_.x().segment<kBiases>(Model::kGyroBias); }
   double gyro_bias(int axis) const noexcept { return filter_.x()(Model::kGyroBias + axis); }
-  /// A wheel's encoder may turn alone: encoder_slip.hpp. Its faults then leave no trace but innovations.
-  void let_encoders_slip(bool slip) noexcept { encoders_slip_ = slip; }
   /// The gyro's bias is known to so much less.
   void doubt_bias(double sigma_rad_s) noexcept {
     filter_.widen(Model::kGyroBias, 1, sigma_rad_s * sigma_rad_s);
@@ -154,7 +153,7 @@ class MipEkf {
   double per_hit_ = 0.0;  // change of yaw rate in a tick, per N
   Vec2 per_push_;         // change of tilt and wheel rate in a tick, per N
   TimeBase<2, 2> time_;
-  bool encoders_slip_ = true;
+  bool encoders_slip_;
   Vec2 gyro_bias_yz_ = Vec2::Zero();
   double heading_ = 0.0;
   bool pushed_ = false;

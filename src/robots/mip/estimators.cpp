@@ -10,14 +10,17 @@ SensorFaultsParams sensor_faults(const MipEstimatorParams& params) {
   p.balances = {true, false, false};
   p.axis_sign = params.gyro_axis_sign;
   p.evidence.encoder_sigma_rad = 0.012;
+  p.evidence.encoder_step_rad = 0.003;
   p.evidence.wheel_step_rad = kTickS * params.robot.k1 / params.robot.k2;
   p.evidence.gyro_sigma_rad_s[1] = 0.1;  // tiles: a wheel climbs 0.7 mm in 0.1 s
   return p;
 }
 
 /// The gyro's scale errs by 3 % (MPU-9250) while the body turns at up to 0.7 rad/s: the tilt walks by so much
-/// a tick, which the control's filter, for its margins, does not say.
+/// a tick, which the control's filter, for its margins, does not say. On two wheels an encoder that counts
+/// backwards looks like one that slips.
 MipEkf::Params evidence(MipEkf::Params p) {
+  p.options.encoders_slip = false;
   p.filter.Q(MipEkfModel::kTheta) = std::pow(0.03 * 0.7 * kTickS, 2);
   return p;
 }
@@ -122,7 +125,6 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
 void MipEstimators::step_ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   MipEstimate& x = at(Id::kEkf);
   step_filter(z, u, body_rates(x));
-  if (params_.detection) bias_drift_.update(faults_.healthy().gyro_biases(), 0.0, 0.0);
   const Vec2 position = x.position_W_m;
   x = ekf_.estimate();
   x.position_W_m = position;

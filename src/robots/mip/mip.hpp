@@ -91,7 +91,6 @@ struct Mip {
   using Estimate = MipEstimate;
   using Sample = Measurement<kWheels>;
   /// Not judged: encoders against gyro.
-  static double slip_rad_s(const Sample&, const MipKinematics&, const MipEstimate&) noexcept { return 0.0; }
 };
 
 inline Vec3 body_rates(const MipEstimate& x) noexcept {

@@ -48,7 +48,6 @@ struct CartPendulum {
   using Kinematics = CartPendulumKinematics;
   using Estimate = CartPendulumEstimate;
   using Sample = Measurement<kWheels>;
-  static double slip_rad_s(const Sample&, const Kinematics&, const Estimate&) noexcept { return 0.0; }
 };
 
 inline StateView cart_pendulum_view(const CartPendulumEstimate& x, double radius_m) noexcept {

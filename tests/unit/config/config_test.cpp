@@ -107,7 +107,7 @@ TEST(Config, AnOverrideOfATableSetsItsKeysAndNoOthers) {
   const MbbrConfig config = load_mbbr(kMbbr, {"safety={max_tilt_rad=0.5, max_stall_s = 2.0}"}).config;
   EXPECT_EQ(config.safety.max_tilt_rad, 0.5);
   EXPECT_EQ(config.safety.max_stall_s, 2.0);
-  EXPECT_EQ(config.safety.max_slip_rad_s, load_mbbr(kMbbr, {}).config.safety.max_slip_rad_s);
+  EXPECT_EQ(config.safety.max_disturbance, load_mbbr(kMbbr, {}).config.safety.max_disturbance);
   EXPECT_THAT(error_of(kMbbr, {"safety={}"}), HasSubstr("--set safety={}: sets nothing"));
   EXPECT_THAT(error_of(kMbbr, {"safety=3"}), HasSubstr("is a table; set one of its keys"));
   EXPECT_THAT(error_of(kMbbr, {"safety={max_tilt=0.5}"}), HasSubstr("no such key"));

@@ -68,6 +68,29 @@ TEST(EncoderSlip, AnMbbrFollowsAWheelTheLessTheFasterItSpins) {
   EXPECT_LT(most_ball_rate_rad_s(100.0), 0.5 * most_ball_rate_rad_s(25.0));
 }
 
+/// The ball rolls; an encoder dies. Were it a slip, the filter would shift its count tick by tick.
+TEST(EncoderSlip, AWheelThatStandsStillDoesNotSlip) {
+  const MbbrConfig config = load_mbbr(configuration("mbbr"), {}).config;
+  const MbbrKinematics kinematics(config.robot);
+  const Vec3 wheels_rad_s = kinematics.wheels_from_ball(Vec3(3.0, 0.0, 0.0));
+  MbbrEkf filter(config.robot, config.estimators.ekf);
+  auto z = at_rest<Mbbr::Sample>();
+  z.wheel_rate_rad_s = wheels_rad_s;
+  filter.start_moving(Vec2::Zero(), Vec3::Zero(), z);
+  int wheel = 0;
+  wheels_rad_s.cwiseAbs().maxCoeff(&wheel);
+  double most = 0.0;
+  for (int k = 1; k <= 120; ++k) {
+    const double stands_rad = z.wheel_angle_rad(wheel);
+    z.wheel_angle_rad += kTickS * wheels_rad_s;
+    if (k > 100) z.wheel_angle_rad(wheel) = stands_rad;
+    filter.predict(Vec3::Zero());
+    filter.update(z);
+    if (k > 100) most = std::max(most, filter.row_nis()[static_cast<std::size_t>(3 + wheel)]);
+  }
+  EXPECT_GT(most, 9.0);
+}
+
 TEST(EncoderSlip, AMotorInItsBacklashMovesNoWheel) {
   const MipConfig config = load_mip(configuration("edumip"), {}).config;
   const MipParameters& p = config.robot;

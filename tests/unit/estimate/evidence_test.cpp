@@ -31,11 +31,13 @@ struct Told {
   std::array<double, 8> innovation{}, variance{};
   const std::array<double, 8>& row_innovation() const { return innovation; }
   const std::array<double, 8>& row_variance() const { return variance; }
+  Vec3 rate_rad_s = Vec3::Zero();
+  Vec3 wheel_rate_rad_s() const { return rate_rad_s; }
 };
 
 TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.0, {}});
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
@@ -50,9 +52,52 @@ TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
   EXPECT_NEAR(as_expected - evidence(filter, z, z), TheEvidence::kOutlier, 1e-3);
 }
 
+/// Of 0.2 rad a tick at most, forwards or backwards, where half of the samples may slip.
+TEST(Evidence, AWheelThatTurnsAnyhowIsNoFault) {
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  evidence.reset(0.0);
+  Told filter;
+  filter.variance.fill(1e-4);
+  const Sample before = at_rest();
+  evidence.hear(before);
+  Sample turned = before;
+  turned.wheel_angle_rad(0) += 0.1;
+  const double as_expected = evidence.expect(filter, turned, turned);
+  filter.innovation[3] = 0.1;
+  const double floor = std::log(0.5 / (2.0 * 0.2));
+  EXPECT_NEAR(as_expected - evidence(filter, turned, turned), -0.5 * std::log(2.0 * kPi * 4e-4) - floor,
+              1e-3);
+  Sample without = turned;
+  without.wheel_ok[0] = false;
+  EXPECT_NEAR(evidence(filter, without, turned), evidence(filter, turned, turned), 1e-9);
+}
+
+/// Of its reading, whose error stays as it was, nothing is heard twice.
+TEST(Evidence, AnEncoderThatStandsIsDeadIfItsWheelTurns) {
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  evidence.reset(0.0);
+  Told filter;
+  filter.variance.fill(1e-4);
+  filter.innovation[3] = 0.03;
+  const Sample z = at_rest();
+  Sample without = z;
+  without.wheel_ok[0] = false;
+  const auto faulty = [&] {
+    evidence.hear(z);
+    evidence.expect(filter, z, z);
+    return evidence(filter, without, z) - evidence(filter, z, z);
+  };
+  EXPECT_NEAR(faulty(), std::log(0.5), 0.15) << "half of the faulty ones stand";
+  EXPECT_NEAR(faulty(), std::log(1.0), 0.15) << "this is one of them";
+  filter.rate_rad_s.x() = 0.5 * 0.02 / kTickS;
+  EXPECT_NEAR(faulty(), std::log(2.0), 0.15) << "a healthy one does so every other time";
+  filter.rate_rad_s.x() = 0.02 / kTickS;
+  EXPECT_NEAR(faulty(), 0.5 * 0.03 * 0.03 / 4e-4, 0.15) << "a healthy one does not";
+}
+
 TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
   evidence.reset(0.0);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -79,7 +124,7 @@ TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
 
 TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
   evidence.reset(0.0);
   std::mt19937 random(4);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -98,7 +143,7 @@ TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
 }
 
 TEST(Evidence, OneLogarithmSaysAsMuchAsOneForEachRow) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
   evidence.reset(0.0);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -115,7 +160,7 @@ TEST(Evidence, OneLogarithmSaysAsMuchAsOneForEachRow) {
 }
 
 TEST(Evidence, KnowsWhenTheFilterHasBecomeLessSure) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
@@ -135,7 +180,7 @@ TEST(Evidence, KnowsWhenTheFilterHasBecomeLessSure) {
 
 TEST(Evidence, AGyroThatShakesIsBelievedLess) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{0.01, 0.2, {}});
+  TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
   evidence.reset(0.001);
   std::mt19937 random(1);
   std::normal_distribution<double> shakes(0.0, 0.05);
@@ -151,7 +196,7 @@ TEST(Evidence, AGyroThatShakesIsBelievedLess) {
 }
 
 TEST(Evidence, WhatIsOffForLongIsNoVibration) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
   evidence.reset(0.001);
   Told filter;
   filter.variance.fill(1e-6);
@@ -163,7 +208,7 @@ TEST(Evidence, WhatIsOffForLongIsNoVibration) {
 }
 
 TEST(Evidence, ASpikeIsNoJump) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.2, {}});
+  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
   evidence.reset(0.05);
   Told filter;
   filter.variance.fill(1e-6);

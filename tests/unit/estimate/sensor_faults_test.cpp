@@ -44,7 +44,7 @@ TEST(FaultHypotheses, EveryEncoderPairAndAxisHasItsOwn) {
   EXPECT_EQ(kinds[FaultHypothesis::kSwap], 3);
   for (int kind = FaultHypothesis::kBias; kind <= FaultHypothesis::kNoise; ++kind) EXPECT_EQ(kinds[kind], 1);
   EXPECT_EQ(kinds[FaultHypothesis::kRock], 0);  // a robot on two wheels rocks
-  EXPECT_EQ(fault_hypotheses<2>().size(), 2U + 2U + 1U + 3U + 3U + 6U + 2U);
+  EXPECT_EQ(fault_hypotheses<2>().size(), 2U + 2U + 1U + 3U + 3U + 7U + 2U);
 }
 
 TEST(FaultHypotheses, HaveTheirNamesByOneTableForEveryRobot) {
@@ -56,10 +56,11 @@ TEST(FaultHypotheses, HaveTheirNamesByOneTableForEveryRobot) {
   EXPECT_EQ(names,
             "encoder_1 encoder_2 encoder_3 encoder_1_reversed encoder_2_reversed encoder_3_reversed "
             "encoders_1_2 encoders_1_3 encoders_2_3 gyro_x gyro_y gyro_z gyro_x_y_swapped gyro_y_z_swapped "
-            "gyro_z_x_swapped gyro_bias imu spin slip push imu_noise ");
+            "gyro_z_x_swapped gyro_bias imu spin slip push imu_noise gyro_drift ");
   EXPECT_EQ(name(edumip[4]), "encoders_1_2");
-  EXPECT_EQ(name(edumip.back()), "event");
-  EXPECT_EQ(name(edumip[edumip.size() - 3]), "imu_noise");
+  EXPECT_EQ(name(edumip.back()), "gyro_drift");
+  EXPECT_EQ(name(edumip[edumip.size() - 2]), "event");
+  EXPECT_EQ(name(edumip[edumip.size() - 4]), "imu_noise");
 }
 
 TEST(UsedSensors, SayWhichVerdictsTheyAreReadBy) {
@@ -79,6 +80,9 @@ TEST(UsedSensors, SayWhichVerdictsTheyAreReadBy) {
   EXPECT_EQ(used.verdicts(), 1U << 6U) << "not the encoder's own, too";
   used.bias_rad_s.x() = 0.2;
   EXPECT_EQ(used.verdicts(), 1U << 6U | 1U << 20U);
+  const FaultHypothesis drift{FaultHypothesis::kDrift, 0};
+  EXPECT_EQ(used.turned_over(drift).verdicts(), 1U << 6U | 1U << 20U | 1U << 28U);
+  EXPECT_EQ(used.turned_over(drift).turned_over(drift).verdicts(), used.verdicts()) << "steady again";
 }
 
 TEST(UsedSensors, ReadWhatIsWrongTheOtherWayRound) {
@@ -149,7 +153,8 @@ class Standing : public testing::Test {
 
   static SensorFaultsParams params() {
     SensorFaultsParams p;
-    p.evidence = {0.012, 0.15};
+    p.evidence = {0.012, 0.0175, 0.15, 0.5};
+    p.bias_drifts = true;
     p.balances = {true, true, false};
     return p;
   }
@@ -212,6 +217,25 @@ TEST_F(Standing, ABiasThatJumpsIsTakenOff) {
   EXPECT_GE(found, 400);
   EXPECT_LE(found, 460) << "0.2 s, and 0.1 s in which it leads: 0.3 rad/s make 0.09 rad of it";
   EXPECT_TRUE(detector.trusted());
+}
+
+/// 0.2 rad/s more each second, for three seconds.
+TEST_F(Standing, ABiasThatDriftsIsFollowedWhileItDoes) {
+  constexpr std::uint32_t kBit = 1U << 28;  // gyro_drift
+  Detector detector = armed();
+  int found = 0;
+  for (int tick = 0; tick < 8000; ++tick) {
+    Sample z = sample();
+    z.gyro_B_rad_s.x() += 0.001 * std::clamp(tick - 400, 0, 600);
+    detector.step(control, Vec3::Zero(), z, Vec3(z.gyro_B_rad_s.x(), 0.0, 0.0));
+    if (found == 0 && detector.evidence().verdicts == kBit) found = tick;
+    ASSERT_TRUE(detector.trusted()) << tick;
+    ASSERT_LT(control.estimate().theta_xy.norm(), 0.2) << tick;
+  }
+  EXPECT_GT(found, 400);
+  EXPECT_LT(found, 700) << "1.5 s";
+  EXPECT_EQ(detector.evidence().verdicts, 0U) << "steady again";
+  EXPECT_NEAR(control.gyro_bias(0), 0.6, 0.02);
 }
 
 TEST_F(Standing, AVerdictSaysWhatLedAndByHowMuch) {

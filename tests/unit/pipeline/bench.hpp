@@ -45,14 +45,6 @@ struct Robot {
   using Kinematics = bench::Kinematics;
   using Estimate = bench::Estimate;
   using Sample = Measurement<kWheels>;
-  static double slip_rad_s(const Sample&, const Kinematics&, const Estimate&) noexcept { return 0.0; }
-};
-
-/// A robot whose encoders can be held against its gyro.
-struct SlippingRobot : Robot {
-  static double slip_rad_s(const Sample& z, const Kinematics& /*k*/, const Estimate& /*x*/) noexcept {
-    return 10.0 * z.gyro_B_rad_s.z();
-  }
 };
 
 struct Update {

@@ -10,7 +10,6 @@ namespace equipoise {
 namespace {
 
 using bench::Bench;
-using bench::SlippingRobot;
 using Health = EstimatorHealth<2>;
 using testing::DoubleNear;
 using testing::ElementsAre;
@@ -107,26 +106,6 @@ TEST(Pipeline, WhatIsNotFiniteStopsTheMotorsWhereverItCameFrom) {
   other.steps(2);
   other.script.x_hat.tilt_rad = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(other.step().reasons & kNotFinite, 0U);
-}
-
-TEST(Pipeline, SlipIsJudgedByAGyroThatIsToBeHadAlone) {
-  const auto slips = [](auto& b) {
-    b.raw.gyro_counts[2] = 180.0 / kPi * 16.4;  // 1 rad/s, which is 10 rad/s of slip
-    return (b.steps(30).reasons & kWheelSlip) != 0;
-  };
-  Bench<SlippingRobot> b;
-  EXPECT_TRUE(slips(b));
-  Bench<SlippingRobot> left_out;
-  left_out.script.health.gyro_left_out = true;
-  EXPECT_FALSE(slips(left_out));
-  Bench<SlippingRobot> frozen;
-  frozen.gyro_noise[2] = 0.0;
-  EXPECT_FALSE(slips(frozen)) << "its axis is dead";
-  Bench<SlippingRobot> others;
-  others.gyro_noise[0] = others.gyro_noise[1] = 0.0;
-  EXPECT_TRUE(slips(others)) << "other axes are";
-  Bench<> cannot_tell;
-  EXPECT_FALSE(slips(cannot_tell));
 }
 
 // --- the encoders' check
