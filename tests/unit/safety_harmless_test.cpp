@@ -23,6 +23,7 @@ const Harmless kHarmless[] = {
        in.state.theta_rad.z() = 3.0;
        in.state.omega_B_rad_s.z() = 30.0;
      }},
+    {"bias", [](SafetyInputs& in, MotorCommand&) { in.bias_drift_rad_s = 0.1; }},
     {"motors", [](SafetyInputs& in, MotorCommand&) { in.disturbance = 2.0; }},
     {"tilt_sigma", [](SafetyInputs& in, MotorCommand&) { in.tilt_sigma_rad = 0.1; }},
     {"battery", [](SafetyInputs& in, MotorCommand&) { in.battery_V = 6.0; }},

@@ -33,6 +33,7 @@ const Fault kFaults[] = {
      }},
     {"falling_not_a_number", kTilt, 1,
      [](SafetyInputs& in, MotorCommand&) { in.state.omega_B_rad_s.y() = NAN; }},
+    {"bias", kImuUntrusted, 1, [](SafetyInputs& in, MotorCommand&) { in.bias_drift_rad_s = 0.11; }},
     {"motors", kMotorFault, 1, [](SafetyInputs& in, MotorCommand&) { in.disturbance = 2.1; }},
     {"tilt_not_a_number", kTilt, 1, [](SafetyInputs& in, MotorCommand&) { in.state.theta_rad.y() = NAN; }},
     {"imu", kImuStale, 3, [](SafetyInputs& in, MotorCommand&) { in.imu_ok = false; }},

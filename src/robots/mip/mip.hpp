@@ -90,7 +90,6 @@ struct Mip {
   using Kinematics = MipKinematics;
   using Estimate = MipEstimate;
   using Sample = Measurement<kWheels>;
-  /// Not judged: encoders against gyro.
 };
 
 inline Vec3 body_rates(const MipEstimate& x) noexcept {
