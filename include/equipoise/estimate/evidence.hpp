@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "equipoise/samples.hpp"
 
@@ -61,9 +62,9 @@ class Evidence {
   /// A tick's first: what is expected of the others, and its own.
   double expect(const Filter& f, const Sample& used, const Sample& came) noexcept {
     for (std::size_t row = 0; row < kRows; ++row) {
-      faulty_[row] = log_faulty(row, came);
+      const bool stood = std::exchange(stands_[row], repeats(row, came));
+      faulty_[row] = log_faulty(row, stood);
       shaken_[row] = log_shaken(row);
-      stands_[row] = repeats(row, came);
     }
     double misfit = 0.0;
     shaken_most_ = 0.0;
@@ -285,14 +286,13 @@ class Evidence {
     if (row >= kAccelRow) return -std::log(2.0 * kAccelRange_m_s2);
     return -std::log(2.0 * p_.wheel_step_rad);
   }
-  /// Half of the faulty encoders stand still; one that stood a tick ago is one of these (Bayes). Before
-  /// stands_ is of this tick.
-  double log_faulty(std::size_t row, const Sample& came) const noexcept {
-    const double anything = std::exp(log_anything(row));
+  /// Half of the faulty encoders stand still; one that `stood` a tick ago is one of these (Bayes).
+  double log_faulty(std::size_t row, bool stood) const noexcept {
     if (row < kWheelRow || row >= kAccelRow) return log_anything(row);
+    const double anything = std::exp(log_anything(row));
     const double still = std::exp(log_still_);
-    const double stands = stands_[row] ? still / (still + anything) : 0.5;
-    return std::log((1.0 - stands) * anything + (repeats(row, came) ? stands * still : 0.0));
+    const double stands = stood ? still / (still + anything) : 0.5;
+    return std::log((1.0 - stands) * anything + (stands_[row] ? stands * still : 0.0));
   }
   /// Of a gross sample of a healthy one. A wheel that slips turns as a faulty encoder's may.
   double log_shaken(std::size_t row) const noexcept {

@@ -23,6 +23,8 @@ Sample at_rest() {
   return z;
 }
 
+constexpr EvidenceParams kParams{0.01, 0.02, 0.2, 0.5, {}};
+
 /// A filter whose innovations are told.
 struct Told {
   struct Model {
@@ -54,7 +56,7 @@ TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
 
 /// Of 0.2 rad a tick at most, forwards or backwards, where half of the samples may slip.
 TEST(Evidence, AWheelThatTurnsAnyhowIsNoFault) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  Evidence<Told, 3> evidence(kParams);
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
@@ -74,7 +76,7 @@ TEST(Evidence, AWheelThatTurnsAnyhowIsNoFault) {
 
 /// Of its reading, whose error stays as it was, nothing is heard twice.
 TEST(Evidence, AnEncoderThatStandsIsDeadIfItsWheelTurns) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  Evidence<Told, 3> evidence(kParams);
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
@@ -97,7 +99,7 @@ TEST(Evidence, AnEncoderThatStandsIsDeadIfItsWheelTurns) {
 
 TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  TheEvidence evidence(kParams);
   evidence.reset(0.0);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -124,7 +126,7 @@ TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
 
 TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  TheEvidence evidence(kParams);
   evidence.reset(0.0);
   std::mt19937 random(4);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -143,7 +145,7 @@ TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
 }
 
 TEST(Evidence, OneLogarithmSaysAsMuchAsOneForEachRow) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  Evidence<Told, 3> evidence(kParams);
   evidence.reset(0.0);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -160,7 +162,7 @@ TEST(Evidence, OneLogarithmSaysAsMuchAsOneForEachRow) {
 }
 
 TEST(Evidence, KnowsWhenTheFilterHasBecomeLessSure) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  Evidence<Told, 3> evidence(kParams);
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
@@ -180,7 +182,7 @@ TEST(Evidence, KnowsWhenTheFilterHasBecomeLessSure) {
 
 TEST(Evidence, AGyroThatShakesIsBelievedLess) {
   using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  TheEvidence evidence(kParams);
   evidence.reset(0.001);
   std::mt19937 random(1);
   std::normal_distribution<double> shakes(0.0, 0.05);
@@ -196,7 +198,7 @@ TEST(Evidence, AGyroThatShakesIsBelievedLess) {
 }
 
 TEST(Evidence, WhatIsOffForLongIsNoVibration) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  Evidence<Told, 3> evidence(kParams);
   evidence.reset(0.001);
   Told filter;
   filter.variance.fill(1e-6);
@@ -208,7 +210,7 @@ TEST(Evidence, WhatIsOffForLongIsNoVibration) {
 }
 
 TEST(Evidence, ASpikeIsNoJump) {
-  Evidence<Told, 3> evidence(EvidenceParams{0.01, 0.02, 0.2, 0.5, {}});
+  Evidence<Told, 3> evidence(kParams);
   evidence.reset(0.05);
   Told filter;
   filter.variance.fill(1e-6);
