@@ -21,7 +21,7 @@ class EncoderCheckOnRobot : public testing::Test {
   /// Its encoder from the start.
   static TrialEnd stuck(std::size_t wheel, std::uint64_t seed, double drive_m_s) {
     return run_trial<Firmware>(
-        choice(Firmware::kDefaultController), seed, 10.0,
+        choice(Firmware::kDefaultController), seed, 6.0,
         [&](RawSample& raw) { raw.encoder_counts[wheel] = 17.0; }, {}, drive_m_s);
   }
 };
@@ -43,12 +43,13 @@ bool safe_and_named(const TrialEnd& end, std::uint32_t reason, std::size_t wheel
 }
 
 /// The eduMIP's soft wheel loop moves it so little that its filter makes a gyro bias of the encoder first:
-/// the gyro is not judged by that.
+/// the gyro is not judged by that. It counts for up to six seconds before it says more than a wheel in its
+/// play.
 TYPED_TEST(EncoderCheckOnRobot, FindsAReversedEncoderAndNamesTheWheel) {
   int unnamed = 0;
   for (std::size_t wheel = 0; wheel < this->kWheels; ++wheel) {
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      const TrialEnd end = run_trial<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 2.0,
+      const TrialEnd end = run_trial<TypeParam>(this->choice(TypeParam::kDefaultController), seed, 6.0,
                                                 [&](RawSample& raw) { raw.encoder_counts[wheel] *= -1.0; });
       unnamed += safe_and_named<TypeParam>(end, kEncoderSign, wheel, seed) ? 0 : 1;
     }

@@ -45,7 +45,9 @@ class Evidence {
   static constexpr std::size_t kAccelRow = kWheelRow + static_cast<std::size_t>(Wheels);
 
   explicit Evidence(const EvidenceParams& params)
-      : p_(params), log_still_(log_normal(0.0, std::pow(kModelError * params.encoder_sigma_rad, 2))) {}
+      : p_(params), log_still_(log_normal(0.0, std::pow(kModelError * params.encoder_sigma_rad, 2))) {
+    width_.fill(-kDiverged);
+  }
 
   /// `sigma_rad_s`: of the gyro, while the robot was at rest.
   void reset(double sigma_rad_s) noexcept {
@@ -68,7 +70,11 @@ class Evidence {
     }
     double misfit = 0.0;
     shaken_most_ = 0.0;
-    const double density = log_density(f, used, came, [&](std::size_t row, double peak, double says) {
+    const double density = log_density(f, used, came, [&](std::size_t row, double area, double says) {
+      const double width = std::log(area);
+      per_area_[row] = 1.0 / area;
+      width_[row] = width - 1.0;
+      const double peak = -0.5 * width;
       peak_[row] = stands_[row] ? std::max(peak, log_still_) : peak;
       misfit += peak_[row] - says;
       shaken_most_ += std::max(shaken_[row] - peak_[row], 0.0);
@@ -217,20 +223,24 @@ class Evidence {
 
   /// Of what is used, whose innovation is as likely. An encoder that repeats itself errs as it did a tick
   /// ago: it says how far its wheel has not turned. A gross sample reads as a faulty sensor's.
-  double log_healthy(const Filter& f, std::size_t row, double log_density) const noexcept {
-    double density = std::max(log_density, shaken_[row]);
-    if (stands_[row]) {
-      const double rate_rad_s = f.wheel_rate_rad_s()(static_cast<int>(row - kWheelRow));
-      const double turned = std::abs(rate_rad_s) * kTickS / p_.encoder_step_rad;
-      density = std::max(density, log_still_ + std::log(std::max(1.0 - turned, 0.0)));
-    }
-    return density;
+  double log_healthy(std::size_t row, double log_density, const Vec<Wheels>& steps) const noexcept {
+    const double density = std::max(log_density, shaken_[row]);
+    if (!stands_[row]) return density;
+    const double stays = 1.0 - std::abs(steps(static_cast<int>(row - kWheelRow)));
+    return std::max(density, log_still_ + std::log(std::max(stays, 0.0)));
+  }
+  /// That its wheels turn in a tick.
+  Vec<Wheels> steps(const Filter& f) const noexcept {
+    const bool one_stands = std::find(stands_.begin(), stands_.end(), true) != stands_.end();
+    if (!one_stands) return Vec<Wheels>::Zero();
+    return f.wheel_rate_rad_s() * (kTickS / p_.encoder_step_rad);
   }
 
-  /// Of the rows that came; those that are not used, as a faulty sensor has them. told(row, density of no
-  /// innovation, density).
+  /// Of the rows that came; those that are not used, as a faulty sensor has them. told(row, 2 pi variance,
+  /// density).
   template <class Told>
   double log_density(const Filter& f, const Sample& used, const Sample& came, Told&& told) const noexcept {
+    const Vec<Wheels> turn = steps(f);
     double sum = 0.0;
     for (std::size_t row = 0; row < kRows; ++row) {
       if (!comes(came, row)) continue;
@@ -239,18 +249,18 @@ class Evidence {
         continue;
       }
       const double variance = spread(f, row);
-      const double width = std::log(2.0 * kPi * variance);
-      const double normal = -0.5 * (width + squared(f, row) / variance);
+      const double normal = log_normal(squared(f, row), variance);
       if (!(normal > kDiverged)) return kDiverged;
-      const double density = log_healthy(f, row, normal);
+      const double density = log_healthy(row, normal, turn);
       sum += density;
-      told(row, -0.5 * width, density);
+      told(row, 2.0 * kPi * variance, density);
     }
     return sum;
   }
 
   /// The same with one logarithm of all variances, as VFP takes long for each.
   double log_density(const Filter& f, const Sample& used, const Sample& came) const noexcept {
+    const Vec<Wheels> turn = steps(f);
     double sum = 0.0;
     double squares = 0.0;
     double product = 1.0;
@@ -264,9 +274,9 @@ class Evidence {
       const double square = squared(f, row) / variance;
       if (!(square >= 0.0 && square < -kDiverged)) return kDiverged;
       const double area = 2.0 * kPi * variance;
-      // Is it no more than of a faulty sensor? log(x) < x / 8 + 1.1.
-      if (stands_[row] || square + 0.125 * area + 1.1 > -2.0 * shaken_[row]) {
-        sum += log_healthy(f, row, -0.5 * (std::log(area) + square));
+      // Is it no more than of a faulty sensor? The tangent of log(area) at what is expected is above it.
+      if (stands_[row] || square + area * per_area_[row] + width_[row] > -2.0 * shaken_[row]) {
+        sum += log_healthy(row, -0.5 * (std::log(area) + square), turn);
       } else {
         squares += square;
         product *= area;
@@ -309,6 +319,8 @@ class Evidence {
   std::array<double, 3> innovation_{};    // of the gyro, a tick ago
   double expected_ = 0.0;                 // log density of what is expected
   std::array<double, kRows> peak_{};      // of it, by row
+  std::array<double, kRows> per_area_{};  // 1 / (2 pi variance)
+  std::array<double, kRows> width_{};     // log(2 pi variance) - 1
   double shaken_most_ = 0.0;              // what could be above it
   std::array<double, kRows> variance_{};  // a tick ago
   bool knows_less_ = true;

@@ -113,7 +113,8 @@ class SensorFaults {
   // (Lorden 1971).
   static constexpr double kBound = 18.6;
   static constexpr double kMargin = 5.0;  // odds of 150 to 1
-  // A push or slip a minute, a fault in 100 hours; wiring is as much rarer again, and again in motion.
+  // A push or slip a minute, a fault in 100 hours; wiring is as much rarer again, three times as
+  // much in motion.
   static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
@@ -293,7 +294,7 @@ class SensorFaults {
     const Member& m = members_[i];
     const bool can_wait = h.kind == FaultHypothesis::kSwap && !p_.balance(h.mask);
     if (can_wait) return left_out_explains(h) ? m.ratio - kEventPrior : -kMargin;
-    if (h.wiring()) return m.ratio - (m.from_start ? 1.0 : 2.0) * kEventPrior;
+    if (h.wiring()) return m.ratio - (m.from_start ? 1.0 : 3.0) * kEventPrior;
     return m.ratio + (h.healthy() && ticks_ - event_at_ > kEventTicks ? kEventPrior : 0.0);
   }
 
