@@ -89,8 +89,8 @@ TEST(Tolerates, WhatWasTheEndBefore) {
   }
 }
 
-/// A standing eduMIP moves too little to say which of its encoders counts backwards; in a turn that looks like
-/// swapped axes of the gyro.
+/// A standing eduMIP moves too little to say which of its encoders counts backwards; in a turn that looks
+/// like swapped axes of the gyro.
 TEST(Tolerates, AnEncoderThatCountsBackwards) {
   const nlohmann::json ridden =
       result("edumip",
