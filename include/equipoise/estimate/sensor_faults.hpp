@@ -118,6 +118,7 @@ class SensorFaults {
   static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
+  static constexpr int kJumpTicks = 200;    // a bias that jumps has moved the tilt by 0.1 rad
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
   static constexpr int kRocking = 400;      // no body rocks for longer
   // Events and faults.
@@ -206,6 +207,8 @@ class SensorFaults {
     bool anew = m.ratio <= -kMargin;
     if (h.waits()) {
       if (anew) return;
+      const bool slow = ticks_ - m.since > kJumpTicks && !(m.ratio > kBound);
+      if (h.kind == FaultHypothesis::kBias && slow) return m.refute(-kMargin);
     } else {
       anew = anew || (h.healthy() && ticks_ - m.since > kEventTicks);
       if constexpr (kRocks) {
