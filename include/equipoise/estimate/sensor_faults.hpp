@@ -118,7 +118,7 @@ class SensorFaults {
   static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
-  static constexpr int kJumpTicks = 200;    // a bias that jumps has moved the tilt by 0.1 rad
+  static constexpr int kShownTicks = 200;   // a bias that jumps has moved the tilt by 0.1 rad
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
   static constexpr int kRocking = 400;      // no body rocks for longer
   // Events and faults.
@@ -204,11 +204,10 @@ class SensorFaults {
                         weigh_.jump(healthy_, all, p_.balances, kJump_rad_s) > std::max(m.ratio, 0.0);
       if (anew && three > -kMargin) return jumped(i, u, z, three);
     }
+    if (shows_soon(h) && ticks_ - m.since > kShownTicks && !(weighed(i) > kBound)) m.refute(-kMargin);
     bool anew = m.ratio <= -kMargin;
     if (h.waits()) {
       if (anew) return;
-      const bool slow = ticks_ - m.since > kJumpTicks && !(m.ratio > kBound);
-      if (h.kind == FaultHypothesis::kBias && slow) return m.refute(-kMargin);
     } else {
       anew = anew || (h.healthy() && ticks_ - m.since > kEventTicks);
       if constexpr (kRocks) {
@@ -287,6 +286,10 @@ class SensorFaults {
       if (its && !(members_[i].ratio > 0.0)) return false;
     }
     return true;
+  }
+  /// Were it so, the robot would have fallen or all but fallen.
+  bool shows_soon(const FaultHypothesis& h) const noexcept {
+    return h.kind == FaultHypothesis::kBias || (h.kind == FaultHypothesis::kSwap && p_.balance(h.mask));
   }
   bool open(const FaultHypothesis& h) const noexcept {
     return used_.leaves_open(h) && (p_.bias_drifts || h.kind != FaultHypothesis::kDrift);
