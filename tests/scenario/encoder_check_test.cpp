@@ -21,7 +21,7 @@ class EncoderCheckOnRobot : public testing::Test {
   /// Its encoder from the start.
   static TrialEnd stuck(std::size_t wheel, std::uint64_t seed, double drive_m_s) {
     return run_trial<Firmware>(
-        choice(Firmware::kDefaultController), seed, 6.0,
+        choice(Firmware::kDefaultController), seed, 10.0,
         [&](RawSample& raw) { raw.encoder_counts[wheel] = 17.0; }, {}, drive_m_s);
   }
 };

@@ -223,13 +223,13 @@ class Evidence {
 
   /// Of what is used, whose innovation is as likely. An encoder that repeats itself errs as it did a tick
   /// ago: it says how far its wheel has not turned. A gross sample reads as a faulty sensor's.
-  double log_healthy(std::size_t row, double log_density, const Vec<Wheels>& steps) const noexcept {
+  double log_healthy(std::size_t row, double log_density, const Vec<Wheels>& turn) const noexcept {
     const double density = std::max(log_density, shaken_[row]);
     if (!stands_[row]) return density;
-    const double stays = 1.0 - std::abs(steps(static_cast<int>(row - kWheelRow)));
+    const double stays = 1.0 - std::abs(turn(static_cast<int>(row - kWheelRow)));
     return std::max(density, log_still_ + std::log(std::max(stays, 0.0)));
   }
-  /// That its wheels turn in a tick.
+  /// That its wheels turn in a tick, in steps of an encoder that stands.
   Vec<Wheels> steps(const Filter& f) const noexcept {
     const bool one_stands = std::find(stands_.begin(), stands_.end(), true) != stands_.end();
     if (!one_stands) return Vec<Wheels>::Zero();
