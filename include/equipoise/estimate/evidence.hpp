@@ -14,7 +14,7 @@ namespace equipoise {
 
 struct EvidenceParams {
   double encoder_sigma_rad = 0.0;            // counts and play
-  double encoder_step_rad = 0.0;             // that a wheel may turn while its encoder stands still
+  double encoder_count_rad = 0.0;            // of a wheel
   double wheel_step_rad = 0.0;               // that a wheel turns in a tick, at most
   double slips = 0.0;                        // share of the wheels' samples
   std::array<double, 3> gyro_sigma_rad_s{};  // of what turns the body beside the model, at least
@@ -70,9 +70,8 @@ class Evidence {
     }
     double misfit = 0.0;
     shaken_most_ = 0.0;
-    const double density = log_density(f, used, came, [&](std::size_t row, double area, double says) {
-      const double width = std::log(area);
-      per_area_[row] = 1.0 / area;
+    const double density = log_density(f, used, came, [&](std::size_t row, double width, double says) {
+      per_area_[row] = 1.0 / (2.0 * kPi * spread(f, row));
       width_[row] = width - 1.0;
       const double peak = -0.5 * width;
       peak_[row] = stands_[row] ? std::max(peak, log_still_) : peak;
@@ -229,15 +228,15 @@ class Evidence {
     const double stays = 1.0 - std::abs(turn(static_cast<int>(row - kWheelRow)));
     return std::max(density, log_still_ + std::log(std::max(stays, 0.0)));
   }
-  /// That its wheels turn in a tick, in steps of an encoder that stands.
+  /// That its wheels turn in a tick; one is a count and the play, within which an encoder may stand still.
   Vec<Wheels> steps(const Filter& f) const noexcept {
     const bool one_stands = std::find(stands_.begin(), stands_.end(), true) != stands_.end();
     if (!one_stands) return Vec<Wheels>::Zero();
-    return f.wheel_rate_rad_s() * (kTickS / p_.encoder_step_rad);
+    return f.wheel_rate_rad_s() * (kTickS / (p_.encoder_count_rad + p_.encoder_sigma_rad));
   }
 
-  /// Of the rows that came; those that are not used, as a faulty sensor has them. told(row, 2 pi variance,
-  /// density).
+  /// Of the rows that came; those that are not used, as a faulty sensor has them. told(row,
+  /// log(2 pi variance), density).
   template <class Told>
   double log_density(const Filter& f, const Sample& used, const Sample& came, Told&& told) const noexcept {
     const Vec<Wheels> turn = steps(f);
@@ -249,11 +248,12 @@ class Evidence {
         continue;
       }
       const double variance = spread(f, row);
-      const double normal = log_normal(squared(f, row), variance);
+      const double width = std::log(2.0 * kPi * variance);
+      const double normal = -0.5 * (width + squared(f, row) / variance);
       if (!(normal > kDiverged)) return kDiverged;
       const double density = log_healthy(row, normal, turn);
       sum += density;
-      told(row, 2.0 * kPi * variance, density);
+      told(row, width, density);
     }
     return sum;
   }

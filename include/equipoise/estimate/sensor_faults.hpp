@@ -113,8 +113,7 @@ class SensorFaults {
   // (Lorden 1971).
   static constexpr double kBound = 18.6;
   static constexpr double kMargin = 5.0;  // odds of 150 to 1
-  // A push or slip a minute, a fault in 100 hours; wiring is as much rarer again, three times as
-  // much in motion.
+  // A push or slip a minute, a fault in 100 hours; wiring as much rarer again, three times so in motion.
   static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
@@ -204,12 +203,9 @@ class SensorFaults {
                         weigh_.jump(healthy_, all, p_.balances, kJump_rad_s) > std::max(m.ratio, 0.0);
       if (anew && three > -kMargin) return jumped(i, u, z, three);
     }
-    if (shows_soon(h) && ticks_ - m.since > kShownTicks && !(weighed(i) > kBound)) m.refute(-kMargin);
-    bool anew = m.ratio <= -kMargin;
-    if (h.waits()) {
-      if (anew) return;
-    } else {
-      anew = anew || (h.healthy() && ticks_ - m.since > kEventTicks);
+    const bool anew = m.ratio <= -kMargin || is_over(i);
+    if (h.waits() && anew) return m.refute(-kMargin);
+    if (!h.waits()) {
       if constexpr (kRocks) {
         if (anew && h.healthy()) members_[fault_index<Wheels>(FaultHypothesis::kEvent)].keep(m);
       }
@@ -287,8 +283,12 @@ class SensorFaults {
     }
     return true;
   }
-  /// Were it so, the robot would have fallen or all but fallen.
-  bool shows_soon(const FaultHypothesis& h) const noexcept {
+  /// A push or slip is; so is a fault by which the robot would have all but fallen, had it been one.
+  bool is_over(std::size_t i) const noexcept {
+    const FaultHypothesis& h = kHypotheses[i];
+    const int age = ticks_ - members_[i].since;
+    if (h.healthy()) return h.kind != FaultHypothesis::kEvent && age > kEventTicks;
+    if (age <= kShownTicks || weighed(i) > kBound) return false;
     return h.kind == FaultHypothesis::kBias || (h.kind == FaultHypothesis::kSwap && p_.balance(h.mask));
   }
   bool open(const FaultHypothesis& h) const noexcept {

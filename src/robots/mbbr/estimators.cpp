@@ -20,7 +20,7 @@ SensorFaultsParams sensor_faults(const MbbrEstimatorParams& params) {
   p.axis_sign = params.gyro_axis_sign;
   p.bias_drifts = true;
   p.evidence.encoder_sigma_rad = 0.012;
-  p.evidence.encoder_step_rad = 2.0 * kPi / 720.0 + p.evidence.encoder_sigma_rad;
+  p.evidence.encoder_count_rad = 2.0 * kPi / 720.0;
   p.evidence.wheel_step_rad = kTickS * no_load_rad_s;
   p.evidence.slips = 0.5;  // as many as of the faulty encoders turn: no verdict comes from turning
   return p;

@@ -10,7 +10,7 @@ SensorFaultsParams sensor_faults(const MipEstimatorParams& params) {
   p.balances = {true, false, false};
   p.axis_sign = params.gyro_axis_sign;
   p.evidence.encoder_sigma_rad = 0.012;
-  p.evidence.encoder_step_rad = 0.003 + p.evidence.encoder_sigma_rad;
+  p.evidence.encoder_count_rad = 0.003;
   p.evidence.wheel_step_rad = kTickS * params.robot.k1 / params.robot.k2;
   p.evidence.gyro_sigma_rad_s[1] = 0.1;  // tiles: a wheel climbs 0.7 mm in 0.1 s
   return p;

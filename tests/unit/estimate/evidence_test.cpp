@@ -23,7 +23,7 @@ Sample at_rest() {
   return z;
 }
 
-constexpr EvidenceParams kParams{0.01, 0.02, 0.2, 0.5, {}};
+constexpr EvidenceParams kParams{0.01, 0.01, 0.2, 0.5, {}};
 
 /// A filter whose innovations are told.
 struct Told {

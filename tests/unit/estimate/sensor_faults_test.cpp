@@ -153,7 +153,7 @@ class Standing : public testing::Test {
 
   static SensorFaultsParams params() {
     SensorFaultsParams p;
-    p.evidence = {0.012, 2.0 * kPi / 720.0 + 0.012, 0.15, 0.5};  // as the MBBR's
+    p.evidence = {0.012, 2.0 * kPi / 720.0, 0.15, 0.5};  // as the MBBR's
     p.bias_drifts = true;
     p.balances = {true, true, false};
     return p;
