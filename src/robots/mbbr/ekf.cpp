@@ -190,7 +190,8 @@ void MbbrEkf::predict(const Vec3& u) noexcept {
   // [T] (6.3)-(6.4), over the tick that the filter leaves behind, by the mean of the rates at its ends.
   const Vec2 before = x().segment<2>(Model::kPhiDotX);
   const double rate_before = x()(Model::kThetaDotZ);
-  const bool pushed = filter_.normalized_innovation() > params_.push_nis;
+  const auto& nis = filter_.row_nis();
+  const bool pushed = 0.5 * (nis[Model::kAccel] + nis[Model::kAccel + 1]) > params_.push_nis;
   filter_.predict(time_.acted());
   if (pushed) {
     filter_.widen(Model::kThetaDotX, 2, params_.push_tilt_rate_variance);

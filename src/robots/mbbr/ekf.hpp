@@ -72,7 +72,7 @@ class MbbrEkf {
     double disturbance_time_constant_s = 1.0;
     double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
     Precision precision = Precision::kDouble;
-    double push_nis = 6.0;  // more than this in a tick is a push: the rates are in doubt by
+    double push_nis = 24.0;  // the accelerometer feels a push; beyond it the rates are in doubt by
     double push_tilt_rate_variance = 0.02;
     double push_ball_rate_variance = 0.5;
   };

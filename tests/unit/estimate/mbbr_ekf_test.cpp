@@ -156,6 +156,27 @@ TEST(MbbrEkf, SkipsADeadGyroAxisAlone) {
   EXPECT_LT(filter.estimate().normalized_innovation, 0.5);
 }
 
+TEST(MbbrEkf, OnlyTheAccelerometerFeelsAPush) {
+  const Turning robot;
+  const MbbrEkf settled = robot.after(5.0);
+  // Of the ball's rates, a tick after samples that are off by so much.
+  const auto doubt = [&](const Vec3& gyro_rad_s, const Vec3& accel_m_s2) {
+    MbbrEkf filter = settled;
+    filter.predict(robot.input());
+    Mbbr::Sample z = robot.at(5.005);
+    z.gyro_B_rad_s += gyro_rad_s;
+    z.accel_B_m_s2 += accel_m_s2;
+    filter.update(z);
+    filter.predict(robot.input());
+    return filter.P()(Model::kPhiDotX, Model::kPhiDotX);
+  };
+  const double usual = doubt(Vec3::Zero(), Vec3::Zero());
+  EXPECT_NEAR(doubt({0.0, 0.0, 3.0}, Vec3::Zero()), usual, 0.01 * usual);  // the ball turns on the floor
+  EXPECT_NEAR(doubt({1.5, 0.0, 0.0}, Vec3::Zero()), usual, 0.01 * usual);  // it shakes
+  EXPECT_NEAR(doubt(Vec3::Zero(), {3.0, 0.0, 0.0}), usual, 0.01 * usual);  // and rolls over a joint
+  EXPECT_GT(doubt(Vec3::Zero(), {12.0, 0.0, 0.0}), usual + 0.4);
+}
+
 TEST(MbbrEkf, SurprisingRowHasALargeInnovation) {
   const Turning robot;
   MbbrEkf filter = robot.after(5.0);

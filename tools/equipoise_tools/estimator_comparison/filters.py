@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from .model import AT, DT, MOTION, PHI, ROWS, SCALE, Model, N, U
+from .model import AT, DT, GROUPS, MOTION, PHI, ROWS, SCALE, Model, N, U
 
 TURN = AT["dtz"]
 RATES = slice(5, 8)
@@ -45,7 +45,7 @@ class Extended:
     def _widen(self) -> None:
         """After a push the rates are in doubt."""
         robot = self.model.robot
-        pushed = (np.square(self.nu).mean(axis=0) > robot.push_nis).astype(float)
+        pushed = (np.square(self.nu[GROUPS["accelerometer"]]).mean(axis=0) > robot.push_nis).astype(float)
         for i in (5, 6):
             self.P[:, i, i] += pushed * robot.push_tilt_rate_variance
         for i in (8, 9):
