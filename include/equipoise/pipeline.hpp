@@ -186,7 +186,7 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     if (encoder_probe_.dead()) in.encoders_stuck |= (1U << Robot::kWheels) - 1U;
     in.encoders_in_check = in.encoders_in_check || health_.checking;
     in.bias_drift_rad_s = health_.bias_drift_rad_s;
-    in.disturbance = health_.disturbance;
+    in.motor_error = health_.motor_error;
     in.left_out = t.degraded & kSensorsLeftOut;
     in.tilt_sigma_rad = health_.tilt_sigma_rad;
     in.saturated = t.saturated;

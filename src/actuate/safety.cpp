@@ -116,7 +116,7 @@ std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs
   std::uint32_t reasons = 0;
   if (bridge_faults_ >= kBridgeTicks) reasons |= kBridgeFault;
   if (stalled) reasons |= kStall;
-  if (armed() && !(in.disturbance <= p_.max_disturbance)) reasons |= kMotorFault;
+  if (armed() && !(in.motor_error <= p_.max_motor_error)) reasons |= kMotorFault;
   if (saturated_ > ticks(p_.max_saturated_s)) reasons |= kSaturated;
   return reasons;
 }

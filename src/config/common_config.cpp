@@ -103,7 +103,7 @@ SafetyParams read_safety(Section s) {
     p.encoder_probe_drive = s.number("encoder_probe_drive", 0.0, 0.6);  // logs before it: 0
   p.max_tilt_sigma_rad = s.number("max_tilt_sigma_rad", 0.01, 1.0);
   p.max_bias_drift_rad_s = s.number("max_bias_drift_rad_s", 0.001, 1.0);
-  p.max_disturbance = s.number("max_disturbance", 0.01, 1000.0);
+  p.max_motor_error = s.number("max_motor_error", 0.01, 1000.0);
   p.max_wheel_rate_rad_s = s.number("max_wheel_rate_rad_s", 1.0, 10000.0);
   p.max_saturated_s = s.number("max_saturated_s", 0.01, 60.0);
   p.max_stall_s = s.number("max_stall_s", 0.01, 60.0);

@@ -111,7 +111,7 @@ std::uint32_t held_fast(double creep_rad_s) {
   Scene scene;
   // Wheels and body that do not move together are a faulty IMU for the detector.
   scene.set = {"safety.encoder_check_drive=0.0", "safety.max_innovation=1000.0",
-               "safety.max_disturbance=1000.0", "safety.detection=false"};
+               "safety.max_motor_error=1000.0", "safety.detection=false"};
   scene.spoil = [creep_rad_s, first = RawSample{}](RawSample& raw, std::int64_t tick) mutable {
     if (tick < 0) {
       first = raw;

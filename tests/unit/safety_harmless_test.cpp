@@ -24,7 +24,7 @@ const Harmless kHarmless[] = {
        in.state.omega_B_rad_s.z() = 30.0;
      }},
     {"bias", [](SafetyInputs& in, MotorCommand&) { in.bias_drift_rad_s = 0.1; }},
-    {"motors", [](SafetyInputs& in, MotorCommand&) { in.disturbance = 2.0; }},
+    {"motors", [](SafetyInputs& in, MotorCommand&) { in.motor_error = 0.75; }},
     {"tilt_sigma", [](SafetyInputs& in, MotorCommand&) { in.tilt_sigma_rad = 0.1; }},
     {"battery", [](SafetyInputs& in, MotorCommand&) { in.battery_V = 6.0; }},
     {"innovation", [](SafetyInputs& in, MotorCommand&) { in.state.normalized_innovation = -2.5; }},
@@ -114,7 +114,7 @@ TEST(Safety, WhatOnlyADrivenRobotShowsIsNothingAgainstArming) {
   SafetyInputs in = well();
   in.arm_requested = false;
   in.bias_drift_rad_s = 1.0;
-  in.disturbance = 10.0;
+  in.motor_error = 10.0;
   in.encoders_stuck = in.encoders_reversed = 1;
   in.saturated = true;
   in.state.theta_rad.x() = 0.20;

@@ -34,7 +34,7 @@ const Fault kFaults[] = {
     {"falling_not_a_number", kTilt, 1,
      [](SafetyInputs& in, MotorCommand&) { in.state.omega_B_rad_s.y() = NAN; }},
     {"bias", kImuUntrusted, 1, [](SafetyInputs& in, MotorCommand&) { in.bias_drift_rad_s = 0.11; }},
-    {"motors", kMotorFault, 1, [](SafetyInputs& in, MotorCommand&) { in.disturbance = 2.1; }},
+    {"motors", kMotorFault, 1, [](SafetyInputs& in, MotorCommand&) { in.motor_error = 0.8; }},
     {"tilt_not_a_number", kTilt, 1, [](SafetyInputs& in, MotorCommand&) { in.state.theta_rad.y() = NAN; }},
     {"imu", kImuStale, 3, [](SafetyInputs& in, MotorCommand&) { in.imu_ok = false; }},
     {"imu_bridged", kImuStale, 31,
@@ -232,7 +232,7 @@ TEST(Safety, ItsLimitsThemselvesAreAllowed) {
   in.command_age_s = p.command_timeout_s;
   in.tilt_sigma_rad = p.max_tilt_sigma_rad;
   in.bias_drift_rad_s = p.max_bias_drift_rad_s;
-  in.disturbance = p.max_disturbance;
+  in.motor_error = p.max_motor_error;
   in.battery_V = p.min_battery_V;
   in.wheel_rate_rad_s[1] = p.max_wheel_rate_rad_s;
   Safety safety(p);

@@ -55,7 +55,7 @@ struct SafetyParams {
   double encoder_probe_drive = 0.0;    // turns a robot whose encoders count nothing; 0: they are believed
   double max_tilt_sigma_rad = 0.1;     // the tilt is not known any more
   double max_bias_drift_rad_s = 0.1;   // of the gyro, against its mean over 20 s
-  double max_disturbance = 2.0;        // of u, as the estimator has it: motors that do not do as told
+  double max_motor_error = 0.75;       // duty by which a motor does other than told, as estimated
   double max_wheel_rate_rad_s = 90.0;  // wheels without load: picked up
   double max_saturated_s = 0.5;        // without a break
   double max_stall_s = 0.3;            // a wheel that stands still at nearly full duty
@@ -78,7 +78,7 @@ struct SafetyInputs {
   double accel_m_s2 = 0.0;        // magnitude of gravity minus acceleration
   double tilt_sigma_rad = 0.0;    // the estimator's own; 0 where it does not tell
   double bias_drift_rad_s = 0.0;  // likewise
-  double disturbance = 0.0;       // likewise
+  double motor_error = 0.0;       // likewise
   std::array<double, kMaxMotors> wheel_rate_rad_s{};
   std::uint32_t left_out = 0;  // bits of sensors that were found out and are not used any more
   bool saturated = false;

@@ -17,7 +17,7 @@ struct EstimatorHealth {
   bool checking = false;          // just armed: the encoders are on trial
   std::uint32_t dead = 0;         // bits of encoders that stand still together while the robot moves
   double bias_drift_rad_s = 0.0;  // of the gyro, lately
-  double disturbance = 0.0;       // of u: what acts like motors that do not do as told
+  double motor_error = 0.0;       // duty by which a motor does other than told
   bool gyro_left_out = false;     // an axis of it
   bool gyro_bias_jumped = false;  // and is taken off since
   bool gyro_trusted = true;

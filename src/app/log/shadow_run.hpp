@@ -236,7 +236,7 @@ class ShadowRun {
     if ((reasons & kEstimatorUnhealthy) != 0) is(x.normalized_innovation, p.max_innovation);
     if ((reasons & kEstimatorUnhealthy) != 0 && h.tilt_sigma_rad > p.max_tilt_sigma_rad)
       is(h.tilt_sigma_rad, p.max_tilt_sigma_rad);
-    if ((reasons & kMotorFault) != 0) is(h.disturbance, p.max_disturbance);
+    if ((reasons & kMotorFault) != 0) is(h.motor_error, p.max_motor_error);
     if ((reasons & kImuUntrusted) != 0 && h.bias_drift_rad_s > p.max_bias_drift_rad_s)
       is(h.bias_drift_rad_s, p.max_bias_drift_rad_s);
   }

@@ -119,7 +119,7 @@ const std::vector<Reason>& safety_reasons() {
        "accelerometer constant",
        "check mount and supply of the IMU; a bias: equipoise calibrate gyro"},
       {kMotorFault, "motor_fault",
-       "motion does not match the motor command: disturbance above safety.max_disturbance",
+       "motion does not match the motor command: a motor is off by more than safety.max_motor_error",
        "check the motor cables; equipoise bringup"},
   };
   return rows;

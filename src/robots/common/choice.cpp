@@ -24,7 +24,7 @@ void doubt_nothing(const Choice& choice, SafetyParams* safety) {
   safety->max_innovation = kNever;
   safety->max_tilt_sigma_rad = kNever;
   safety->max_bias_drift_rad_s = kNever;
-  safety->max_disturbance = kNever;
+  safety->max_motor_error = kNever;
   safety->encoder_check_drive = 0.0;
   safety->encoder_probe_drive = 0.0;
 }

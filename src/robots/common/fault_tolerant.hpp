@@ -47,7 +47,7 @@ class FaultTolerant {
     report(faults_, &h);
     if (faults_.suspects()) return h;  // a fault may explain what the filter has made of it: a bias, a torque
     h.bias_drift_rad_s = bias_drift_.distance_rad_s();
-    h.disturbance = ekf_.disturbance().norm();
+    h.motor_error = kinematics_.wheels_from_axes(ekf_.disturbance()).cwiseAbs().maxCoeff();
     return h;
   }
 

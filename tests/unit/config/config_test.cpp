@@ -107,7 +107,7 @@ TEST(Config, AnOverrideOfATableSetsItsKeysAndNoOthers) {
   const MbbrConfig config = load_mbbr(kMbbr, {"safety={max_tilt_rad=0.5, max_stall_s = 2.0}"}).config;
   EXPECT_EQ(config.safety.max_tilt_rad, 0.5);
   EXPECT_EQ(config.safety.max_stall_s, 2.0);
-  EXPECT_EQ(config.safety.max_disturbance, load_mbbr(kMbbr, {}).config.safety.max_disturbance);
+  EXPECT_EQ(config.safety.max_motor_error, load_mbbr(kMbbr, {}).config.safety.max_motor_error);
   EXPECT_THAT(error_of(kMbbr, {"safety={}"}), HasSubstr("--set safety={}: sets nothing"));
   EXPECT_THAT(error_of(kMbbr, {"safety=3"}), HasSubstr("is a table; set one of its keys"));
   EXPECT_THAT(error_of(kMbbr, {"safety={max_tilt=0.5}"}), HasSubstr("no such key"));
@@ -225,7 +225,7 @@ TEST(Config, NothingIsDoubtedInSimulationOnly) {
   const MbbrConfig config = load_mbbr(kMbbr, {"safety.detection=false"}).config;
   Choice choice{"ekf", "scheduled", "full"};
   EXPECT_FALSE(MbbrFirmware::apply(config, choice).estimators.detection);
-  EXPECT_TRUE(std::isinf(MbbrFirmware::apply(config, choice).safety.max_disturbance));
+  EXPECT_TRUE(std::isinf(MbbrFirmware::apply(config, choice).safety.max_motor_error));
   EXPECT_TRUE(std::isfinite(MbbrFirmware::apply(config, choice).safety.max_fall_rad));
   choice.fidelity.clear();  // on hardware
   choice.backend = "board";

@@ -41,7 +41,7 @@ TEST(Pipeline, WhatTheEstimatorDoubtsStopsTheMotors) {
   health.bias_drift_rad_s = 0.2;
   EXPECT_EQ(reasons_with(health), std::uint32_t{kImuUntrusted});
   health = {};
-  health.disturbance = 3.0;
+  health.motor_error = 3.0;
   EXPECT_EQ(reasons_with(health), std::uint32_t{kMotorFault});
   health = {};
   health.tilt_sigma_rad = 0.2;
