@@ -3,6 +3,7 @@
 import tomllib
 
 from equipoise_tools import agreement, full_world
+from equipoise_tools.trials import run_trials
 
 
 def leaves(table, prefix=""):
@@ -82,3 +83,31 @@ def test_our_calm_floor_is_level_and_nothing_pushes(root):
     assert "world.full.random_pushes.every_s=0" in settings
     assert "world.full.disturbance.floor_slope_rad=[0,0]" in settings
     assert "world.full.floor.sill_m=0" in settings
+
+
+def full(root, robots, duration_s, yaw_hz=0.0, drive_mps=0.0, settings=None):
+    """MBBRs in `full`, seed = robot."""
+    asked = [
+        {
+            "robot": r,
+            "seed": r,
+            "yaw_hz": yaw_hz,
+            "drive_mps": drive_mps,
+            "duration_s": duration_s,
+            "fidelity": "full",
+        }
+        for r in robots
+    ]
+    return run_trials(root / "config/mbbr.toml", asked, settings=settings)
+
+
+def test_friction_on_every_wheel_is_no_motor_fault(root):
+    """Each of the three lacks half of its torque; together that was more than one motor can do."""
+    rows = full(root, range(8301, 8401), 5.0)
+    assert sum("motor_fault" in row["reasons"] for row in rows) <= 2  # 9 with the norm of all
+
+
+def test_wheels_that_slip_are_no_push(root):
+    """What was taken for one let the filter follow them."""
+    rows = full(root, range(8401, 8441), 20.0, 3.0, 0.2, {"safety.detection": "false"})
+    assert sum(not row["fell"] for row in rows) >= 24  # 17 when any large innovation was a push
