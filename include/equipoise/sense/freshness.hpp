@@ -60,8 +60,7 @@ class Freshness {
   // still.
   static constexpr int kStill = 6;
   static constexpr int kFrozen = 10;
-  static constexpr int kMaxLate = 100;  // late for half a second: it is the clock that is wrong
-  static constexpr int kForget = 200;   // ticks without a jump after which one is forgotten
+  static constexpr int kForget = 200;  // ticks without a jump after which one is forgotten
   static constexpr int kMaxJumps = 3;
 
   template <std::size_t N>
@@ -127,13 +126,11 @@ class Freshness {
   bool is_new(std::int64_t t_ns, std::int64_t now_ns) noexcept {
     const std::int64_t age = now_ns - t_ns;
     const std::int64_t later = age - age_ns_;  // than usual
-    const bool new_clock = !imu_known_ || std::abs(later) > kNewClock_ns || late_ > kMaxLate;
+    const bool new_clock = !imu_known_ || std::abs(later) > kNewClock_ns;
     const bool advances = new_clock || t_ns > stamp_ns_;
     stamp_ns_ = t_ns;
     if (new_clock || later < 0) age_ns_ = age;
-    const bool late = !new_clock && later > kLate_ns;
-    late_ = late ? late_ + 1 : 0;
-    return advances && !late;
+    return advances && (new_clock || later <= kLate_ns);
   }
 
   bool encoders(RawSample* raw, int ticks, const Counts& moved) noexcept {
@@ -172,7 +169,6 @@ class Freshness {
   int accel_still_ = 0;
   std::int64_t stamp_ns_ = 0;
   std::int64_t age_ns_ = 0;  // of a sample when the loop wakes
-  int late_ = 0;
   bool encoders_known_ = false;
   int unread_ticks_ = 0;
   Counts counts_{};  // as the encoders have them
