@@ -48,9 +48,10 @@ def spectrum(log: Log, channel: str) -> tuple[np.ndarray, np.ndarray]:
 def lines(log: Log, summary: dict) -> dict:
     """Where the ball's own rate vibrates most in 12 to 60 rad/s, and the floors of the ball and the "
     "estimate."""
+    wanted = ("floor_rad_s", "line_rad_s", "line_over_floor")
+    found = {("", f"{name}_{what}"): np.nan for name in ("ball", "estimate") for what in wanted}
     if summary["ended"] != "finished":
-        return {}
-    found = {}
+        return found
     for name, channel in (("ball", names.TRUTH), ("estimate", names.STATE)):
         omega, amplitude = spectrum(log, channel)
         quiet = (omega > FLOOR[0]) & (omega < FLOOR[1])
