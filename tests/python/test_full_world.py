@@ -3,7 +3,6 @@
 import tomllib
 
 from equipoise_tools import agreement, full_world
-from equipoise_tools.trials import run_trials
 
 
 def leaves(table, prefix=""):
@@ -38,13 +37,11 @@ def test_every_key_of_the_population_is_an_effects(root):
 def test_effects_alone_leave_the_others_out(tmp_path, monkeypatch):
     asked = []
 
-    def trials(command, **_):
-        asked.append([command[i + 1] for i, word in enumerate(command) if word == "--set"])
-        (tmp_path / command[command.index("--json") + 1]).write_text('{"trials": []}')
-        return type("Done", (), {"returncode": 0})
+    def trials(_config, _asked, settings):
+        asked.append([f"{key}={value}" for key, value in settings.items()])
+        return []
 
-    monkeypatch.setattr(full_world.subprocess, "run", trials)
-    monkeypatch.setattr(full_world, "binary", lambda: "equipoise")
+    monkeypatch.setattr(full_world, "run_trials", trials)
     runs = full_world.Trials(tmp_path, range(1, 3))
     runs.run("mbbr", "firmware", (0.0, 0.0), "alone wheel slip+pushes")
     runs.run("mbbr", "firmware", (0.0, 0.0), "without pushes")
@@ -85,29 +82,15 @@ def test_our_calm_floor_is_level_and_nothing_pushes(root):
     assert "world.full.floor.sill_m=0" in settings
 
 
-def full(root, robots, duration_s, yaw_hz=0.0, drive_mps=0.0, settings=None):
-    """MBBRs in `full`, seed = robot."""
-    asked = [
-        {
-            "robot": r,
-            "seed": r,
-            "yaw_hz": yaw_hz,
-            "drive_mps": drive_mps,
-            "duration_s": duration_s,
-            "fidelity": "full",
-        }
-        for r in robots
-    ]
-    return run_trials(root / "config/mbbr.toml", asked, settings=settings)
-
-
-def test_friction_on_every_wheel_is_no_motor_fault(root):
+def test_friction_on_every_wheel_is_no_motor_fault(tmp_path, monkeypatch):
     """Each of the three lacks half of its torque; together that was more than one motor can do."""
-    rows = full(root, range(8301, 8401), 5.0)
+    monkeypatch.setattr(full_world, "DURATION_S", 5.0)
+    rows = full_world.Trials(tmp_path, range(8301, 8401)).run("mbbr", "firmware", (0.0, 0.0))
+    assert len(rows) == 100
     assert sum("motor_fault" in row["reasons"] for row in rows) <= 2  # 9 with the norm of all
 
 
-def test_wheels_that_slip_are_no_push(root):
+def test_wheels_that_slip_are_no_push(tmp_path):
     """What was taken for one let the filter follow them."""
-    rows = full(root, range(8401, 8441), 20.0, 3.0, 0.2, {"safety.detection": "false"})
+    rows = full_world.Trials(tmp_path, range(8401, 8441)).run("mbbr", "nothing judged", (3.0, 0.2))
     assert sum(not row["fell"] for row in rows) >= 24  # 17 when any large innovation was a push

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
 
-from .paths import UserError, binary, repository_root
+from .paths import UserError, repository_root
+from .trials import run_trials
 
 PAGE = Path("docs/reports/full-world.md")
 BEGIN, END = "<!-- tables: python -m equipoise_tools.full_world --write -->\n", "<!-- end -->\n"
@@ -23,9 +23,9 @@ POINTS = {
 }
 # Settings, and estimator if not the default.
 KINDS = {
-    "true states": (["safety.detection=false"], "truth"),
-    "nothing judged": (["safety.detection=false"], ""),
-    "firmware": ([], ""),
+    "true states": ({"safety.detection": "false"}, "truth"),
+    "nothing judged": ({"safety.detection": "false"}, ""),
+    "firmware": ({}, ""),
 }
 # Upright with the firmware of a8d827e, of the robots 1 to 100 (eduMIP), 1 to 40 (MBBR).
 BASELINE = {
@@ -80,8 +80,8 @@ EFFECTS = {
 }
 
 
-def settings_without(effects: list[str]) -> list[str]:
-    return [f"world.full.{key}={value}" for name in effects for key, value in EFFECTS[name].items()]
+def settings_without(effects: list[str]) -> dict[str, str]:
+    return {f"world.full.{key}": value for name in effects for key, value in EFFECTS[name].items()}
 
 
 class Trials:
@@ -99,24 +99,17 @@ class Trials:
         if not done.exists() and self.draw:
             return []
         if not done.exists():
-            trials = [
+            asked = [
                 {"robot": n, "seed": n, "yaw_hz": point[0], "drive_mps": point[1]}
                 | {"duration_s": DURATION_S, "estimator": estimator}
                 for n in self.robots
             ]
-            request, unfinished = done.with_suffix(".in"), done.with_suffix(".part")
-            request.write_text(json.dumps({"trials": trials}))
-            config = repository_root() / f"config/{robot}.toml"
-            command = [binary(), "trials", "--config", config, "--in", request, "--json", unfinished]
-            for setting in [*sets, *settings_without(effects)]:
-                command += ["--set", setting]
-            ended = subprocess.run([str(w) for w in command], capture_output=True, text=True, check=False)
-            if ended.returncode != 0:
-                raise UserError(ended.stderr.strip())
-            request.unlink()
+            rows = run_trials(f"config/{robot}.toml", asked, sets | settings_without(effects))
+            unfinished = done.with_suffix(".part")
+            unfinished.write_text(json.dumps({"trials": rows}))
             unfinished.rename(done)
-        rows: list[dict] = json.loads(done.read_text())["trials"]
-        return rows
+        found: list[dict] = json.loads(done.read_text())["trials"]
+        return found
 
 
 def upright(rows: list[dict]) -> str:
