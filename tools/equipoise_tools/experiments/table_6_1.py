@@ -45,21 +45,23 @@ def spectrum(log: Log, channel: str) -> tuple[np.ndarray, np.ndarray]:
     return mocap.spectrum(t_s[settled], metrics.rolling_rates(log[channel], 2)[settled, 1])
 
 
+def strongest_line(log: Log, channel: str) -> tuple[float, float, float]:
+    """Of the ball's rate in 12 to 60 rad/s: floor and frequency, rad/s, and how far above the floor."""
+    omega, amplitude = spectrum(log, channel)
+    floor = float(np.median(amplitude[(omega > FLOOR[0]) & (omega < FLOOR[1])]))
+    seen = (omega > 12.0) & (omega < FLOOR[1])
+    at = np.flatnonzero(seen)[np.argmax(amplitude[seen])]
+    return floor, float(omega[at]), float(amplitude[at]) / floor
+
+
 def lines(log: Log, summary: dict) -> dict:
-    """Where the ball's own rate vibrates most in 12 to 60 rad/s, and the floors of the ball and the "
-    "estimate."""
-    wanted = ("floor_rad_s", "line_rad_s", "line_over_floor")
-    found = {("", f"{name}_{what}"): np.nan for name in ("ball", "estimate") for what in wanted}
-    if summary["ended"] != "finished":
-        return found
+    """Of the ball's own rate and of its estimate; NaN of a run that has not finished."""
+    found = {}
     for name, channel in (("ball", names.TRUTH), ("estimate", names.STATE)):
-        omega, amplitude = spectrum(log, channel)
-        quiet = (omega > FLOOR[0]) & (omega < FLOOR[1])
-        found["", f"{name}_floor_rad_s"] = float(np.median(amplitude[quiet]))
-        seen = (omega > 12.0) & (omega < FLOOR[1])
-        at = np.flatnonzero(seen)[np.argmax(amplitude[seen])]
-        found["", f"{name}_line_rad_s"] = float(omega[at])
-        found["", f"{name}_line_over_floor"] = float(amplitude[at]) / found["", f"{name}_floor_rad_s"]
+        finished = summary["ended"] == "finished"
+        values = strongest_line(log, channel) if finished else (np.nan, np.nan, np.nan)
+        for what, value in zip(("floor_rad_s", "line_rad_s", "line_over_floor"), values, strict=True):
+            found["", f"{name}_{what}"] = value
     return found
 
 
