@@ -221,7 +221,10 @@ class SensorFaults {
     m.innovate(used);
     double gain = weigh_(m.filter, used, z) - as_used;
     if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
-    m.ratio += gain;
+    // A fault explains the other sensors: one beside which a wheel has to slip, too, explains nothing. But
+    // with its axes swapped a robot falls at once, and slips.
+    const bool explains = h.healthy() || h.kind == FaultHypothesis::kSwap || !m.filter.slipped();
+    m.ratio += explains ? gain : std::min(gain, 0.0);
     if (!(m.ratio > 0.0)) m.since = ticks_;
     if (!(m.ratio > -kMargin)) m.refute(-kMargin);
     if (h.kind == FaultHypothesis::kBias && jump_rad_s(m) < weigh_.least_jump_rad_s()) m.refute(-kMargin);

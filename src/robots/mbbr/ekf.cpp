@@ -235,8 +235,8 @@ void MbbrEkf::innovate(const Mbbr::Sample& z) noexcept {
   const auto counts = [this](const Vec3& wheels) { return kinematics_.ball_from_wheels(wheels); };
   // What stands still does not slip: it is stuck, or its encoder is dead.
   const auto widens = [this](int i, double nis) { return time_.stands(i) ? 1.0 : slips(nis); };
-  if (widen_by_slip<3>(filter_, Model::kWheel, Model::kE, widens, counts))
-    filter_.weigh_again(time_.acted(), y, use);
+  slipped_ = widen_by_slip<3>(filter_, Model::kWheel, Model::kE, widens, counts);
+  if (slipped_) filter_.weigh_again(time_.acted(), y, use);
 }
 
 Vec3 MbbrEkf::wheel_rate_rad_s() const noexcept {

@@ -129,6 +129,8 @@ class MbbrEkf {
   const std::array<double, 8>& row_variance() const noexcept { return filter_.row_variance(); }
   double row_noise(std::size_t row) const noexcept { return filter_.row_noise(row); }
   void set_row_noise(std::size_t row, double variance) noexcept { filter_.set_row_noise(row, variance); }
+  /// A wheel did in the last update, or seemed to.
+  bool slipped() const noexcept { return slipped_; }
   double tilt_sigma_rad() const noexcept {
     return std::sqrt(filter_.variance(Model::kThetaX) + filter_.variance(Model::kThetaY));
   }
@@ -145,6 +147,7 @@ class MbbrEkf {
   double heading_ = 0.0;
   Turn direction_{0.0};  // of it
   Vec2 phi_ = Vec2::Zero();
+  bool slipped_ = false;
 };
 
 }  // namespace equipoise

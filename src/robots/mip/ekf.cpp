@@ -287,8 +287,8 @@ void MipEkf::innovate(const Mip::Sample& z) noexcept {
   const auto counts = [this](const Vec2& wheels) {
     return Vec2(kinematics_.phi(wheels), kinematics_.psi(wheels));
   };
-  if (encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, slips, counts))
-    filter_.weigh_again(time_.acted(), y, use);
+  slipped_ = encoders_slip_ && widen_by_slip<2>(filter_, Model::kWheel, Model::kPhi, slips, counts);
+  if (slipped_) filter_.weigh_again(time_.acted(), y, use);
 }
 
 Vec2 MipEkf::wheel_rate_rad_s() const noexcept {

@@ -143,6 +143,8 @@ class MipEkf {
   const std::array<double, 6>& row_variance() const noexcept { return filter_.row_variance(); }
   double row_noise(std::size_t row) const noexcept { return filter_.row_noise(row); }
   void set_row_noise(std::size_t row, double variance) noexcept { filter_.set_row_noise(row, variance); }
+  /// A wheel did in the last update, or seemed to, if they may at all.
+  bool slipped() const noexcept { return slipped_; }
   double tilt_sigma_rad() const noexcept { return std::sqrt(filter_.variance(Model::kTheta)); }
 
  private:
@@ -154,6 +156,7 @@ class MipEkf {
   Vec2 per_push_;         // change of tilt and wheel rate in a tick, per N
   TimeBase<2, 2> time_;
   bool encoders_slip_;
+  bool slipped_ = false;
   Vec2 gyro_bias_yz_ = Vec2::Zero();
   double heading_ = 0.0;
   bool pushed_ = false;
