@@ -94,3 +94,10 @@ def test_wheels_that_slip_are_no_push(tmp_path):
     """What was taken for one let the filter follow them."""
     rows = full_world.Trials(tmp_path, range(8401, 8441)).run("mbbr", "nothing judged", (3.0, 0.2))
     assert sum(not row["fell"] for row in rows) >= 24  # 17 when any large innovation was a push
+
+
+def test_wheels_that_slip_are_no_fault(tmp_path):
+    """What a fault's own filter sees slip, too, speaks for none."""
+    trials = full_world.Trials(tmp_path, range(8441, 8481))
+    rows = [row for yaw_hz in (1.0, 2.0) for row in trials.run("mbbr", "firmware", (yaw_hz, 0.2))]
+    assert sum(row["excluded_healthy"] for row in rows) <= 11  # of 80; 16 when that spoke for it
