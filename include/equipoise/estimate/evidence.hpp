@@ -47,6 +47,19 @@ class Evidence {
   explicit Evidence(const EvidenceParams& params)
       : p_(params), log_still_(log_normal(0.0, std::pow(kModelError * params.encoder_sigma_rad, 2))) {
     width_.fill(-kDiverged);
+    for (std::size_t row = 0; row < kRows; ++row) {
+      faulty_[row] = log_anything(row);
+      // Of a gross sample of a healthy one. A wheel that slips turns as a faulty encoder's may.
+      shaken_[row] = faulty_[row] + std::log(row < 3 ? kShaken : row < kAccelRow ? p_.slips : kFelt);
+    }
+    // Half of the faulty encoders stand still; one that stood a tick ago is one of these (Bayes).
+    const double anything = std::exp(log_anything(kWheelRow));
+    const double still = std::exp(log_still_);
+    const std::array<double, 2> stands{0.5, still / (still + anything)};
+    for (std::size_t stood = 0; stood < 2; ++stood) {
+      log_turns_[stood] = std::log((1.0 - stands[stood]) * anything);
+      log_stands_[stood] = std::log((1.0 - stands[stood]) * anything + stands[stood] * still);
+    }
   }
 
   /// `sigma_rad_s`: of the gyro, while the robot was at rest.
@@ -63,10 +76,9 @@ class Evidence {
 
   /// A tick's first: what is expected of the others, and its own.
   double expect(const Filter& f, const Sample& used, const Sample& came) noexcept {
-    for (std::size_t row = 0; row < kRows; ++row) {
+    for (std::size_t row = kWheelRow; row < kAccelRow; ++row) {
       const bool stood = std::exchange(stands_[row], repeats(row, came));
-      faulty_[row] = log_faulty(row, stood);
-      shaken_[row] = log_shaken(row);
+      faulty_[row] = (stands_[row] ? log_stands_ : log_turns_)[stood];
     }
     double misfit = 0.0;
     shaken_most_ = 0.0;
@@ -213,7 +225,7 @@ class Evidence {
   static constexpr double kRounding = 0.25;  // nats, and that each filter has its own Jacobians
 
   bool repeats(std::size_t row, const Sample& came) const noexcept {
-    return row >= kWheelRow && row < kAccelRow && known_ && reading(came, row) == reading(before_, row);
+    return known_ && reading(came, row) == reading(before_, row);
   }
 
   static double log_normal(double squared, double variance) noexcept {
@@ -296,18 +308,6 @@ class Evidence {
     if (row >= kAccelRow) return -std::log(2.0 * kAccelRange_m_s2);
     return -std::log(2.0 * p_.wheel_step_rad);
   }
-  /// Half of the faulty encoders stand still; one that `stood` a tick ago is one of these (Bayes).
-  double log_faulty(std::size_t row, bool stood) const noexcept {
-    if (row < kWheelRow || row >= kAccelRow) return log_anything(row);
-    const double anything = std::exp(log_anything(row));
-    const double still = std::exp(log_still_);
-    const double stands = stood ? still / (still + anything) : 0.5;
-    return std::log((1.0 - stands) * anything + (stands_[row] ? stands * still : 0.0));
-  }
-  /// Of a gross sample of a healthy one. A wheel that slips turns as a faulty encoder's may.
-  double log_shaken(std::size_t row) const noexcept {
-    return log_anything(row) + std::log(row < 3 ? kShaken : row < kAccelRow ? p_.slips : kFelt);
-  }
 
   double bounded(double log_density) const noexcept {
     return std::log(std::exp(std::min(log_density - expected_, 100.0)) + std::exp(-kOutlier));
@@ -324,6 +324,8 @@ class Evidence {
   double shaken_most_ = 0.0;              // what could be above it
   std::array<double, kRows> variance_{};  // a tick ago
   bool knows_less_ = true;
+  // Log densities of a faulty encoder that turns, or stands still, by whether it stood a tick ago.
+  std::array<double, 2> log_turns_{}, log_stands_{};
   std::array<double, kRows> faulty_{};  // log densities, of this tick
   std::array<double, kRows> shaken_{};  // of a gross sample
   std::array<bool, kRows> stands_{};    // an encoder, since the tick before
