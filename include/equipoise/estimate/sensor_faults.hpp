@@ -210,7 +210,8 @@ class SensorFaults {
         if (anew && h.healthy()) members_[fault_index<Wheels>(FaultHypothesis::kEvent)].keep(m);
       }
       const double most = (anew ? 0.0 : m.ratio) + m.most(h, weigh_, all, z) - as_used;
-      if (most <= -kMargin && (anew || !m.apart)) return m.refute(-kMargin);
+      // A sum that begins with a loss says no more than one that begins later.
+      if (anew ? most <= 0.0 : most <= -kMargin && !m.apart) return m.refute(-kMargin);
     }
     ++ran_;
     if (h.kind != FaultHypothesis::kNoise) hear_vibration(m.filter, p_.evidence.gyro_sigma_rad_s);
