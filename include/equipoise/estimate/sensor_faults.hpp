@@ -94,7 +94,7 @@ class SensorFaults {
   bool suspects() const noexcept { return suspects_; }
   /// Encoders that were found so early that they are wired so.
   std::uint32_t wired_backwards() const noexcept {
-    return mirrored_at_ <= kArmingTicks ? used_.backwards : 0U;
+    return mirrored_at_ <= kArmingTicks ? used_.backwards : 0;
   }
   /// Filters that ran in this tick.
   int ran() const noexcept { return ran_; }
@@ -120,7 +120,6 @@ class SensorFaults {
   static constexpr int kShownTicks = 200;   // a bias that jumps has moved the tilt by 0.1 rad
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
   static constexpr int kRocking = 400;      // no body rocks for longer
-  // Events and faults.
   static constexpr double kJump_rad_s = 0.3;
   static constexpr double kBias_rad_s = 0.1;  // uncertain after a jump: the noise of one sample
 
@@ -146,11 +145,9 @@ class SensorFaults {
 
   void begin_all() noexcept {
     for (std::size_t i = 0; i < kCount; ++i) begin(i, healthy_);
-    stale_ = false;
-    suspects_ = false;
+    stale_ = suspects_ = false;
     undecided_ = leads_for_ = 0;
   }
-
   void begin(std::size_t i, const Filter& from) noexcept { begin(i, from, from); }
   /// `state`: that, or what it has predicted since, which is the same for all.
   void begin(std::size_t i, const Filter& from, const Filter& state) noexcept {
@@ -222,8 +219,7 @@ class SensorFaults {
     m.innovate(used);
     double gain = weigh_(m.filter, used, z) - as_used;
     if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
-    // A fault explains the other sensors: one beside which a wheel has to slip, too, explains nothing. But
-    // with its axes swapped a robot falls at once, and slips.
+    // A fault beside which a wheel still has to slip explains nothing; only swapped axes make a robot slip.
     const bool explains = h.healthy() || h.kind == FaultHypothesis::kSwap || !m.filter.slipped();
     m.ratio += explains ? gain : std::min(gain, 0.0);
     if (!(m.ratio > 0.0)) m.since = ticks_;
@@ -322,7 +318,7 @@ class SensorFaults {
       second = weight[i];
       runner_up = i;
     }
-    const std::int32_t next = runner_up == best ? -1 : kRows[runner_up];
+    const int next = runner_up == best ? -1 : kRows[runner_up];
     evidence_ = {kRows[best], weight[best], kBound, next, second, false, evidence_.verdicts};
     leads_for_ = best == leader_ && weight[best] > kBound ? leads_for_ + 1 : 0;
     leader_ = best;
