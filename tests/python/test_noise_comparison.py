@@ -30,6 +30,13 @@ def test_noise_of_another_size_or_colour_is_told_apart(other):
     assert noise_comparison.told_apart(f(noise(1)), f(noise(2, **other))) > 0.95
 
 
+def test_a_robot_unlike_the_others_is_told_from_its_own_population():
+    alike = [noise(seed, seconds=10) for seed in (1, 2)]
+    unlike = [noise(seed, keep=keep, seconds=10) for seed, keep in ((1, 0.0), (2, 0.6))]
+    assert noise_comparison.own_auc(alike, 9) < 0.75
+    assert noise_comparison.own_auc(unlike, 9) > 0.95
+
+
 def test_real_noise_lies_within_a_factor_of_the_population(root):
     log = root.parent / "shared/real/pichim+Mini_Segway/docs/matlab/LOG278.TXT"
     if not log.exists():

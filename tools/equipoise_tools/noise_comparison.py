@@ -132,6 +132,17 @@ def told_apart(real: np.ndarray, made: np.ndarray, folds: int = 5) -> float:
     return area_under_curve(scores, is_real)
 
 
+def own_auc(runs: list[np.ndarray], windows: int) -> float:
+    """The same of each simulated robot against the others, median: how far a robot of the population gets."""
+    made = [features(run) for run in runs]
+    aucs = []
+    for k, own in enumerate(made):
+        others = [other for j, other in enumerate(made) if j != k]
+        if others and len(own) >= windows:
+            aucs.append(told_apart(own[:windows], np.vstack(others), folds=min(5, windows // 2)))
+    return float(np.median(aucs)) if aucs else float("nan")
+
+
 def each_alone(real: np.ndarray, made: np.ndarray) -> dict[str, float]:
     """AUC of each feature by itself, the most telling first; below 0.5: less of it in the real log."""
     is_real = np.arange(len(real) + len(made)) < len(real)
@@ -166,6 +177,7 @@ def compare(real: dict[str, np.ndarray], made: list[dict[str, np.ndarray]]) -> d
             others = np.vstack([features(run) for run in runs])
             result[name] |= {"real_windows": len(windows), "simulated_windows": len(others)}
             result[name]["auc"] = told_apart(windows, others, folds=min(5, len(windows) // 2))
+            result[name]["own_auc"] = own_auc(runs, len(windows))
             result[name]["features"] = each_alone(windows, others)
     return result
 
@@ -173,7 +185,10 @@ def compare(real: dict[str, np.ndarray], made: list[dict[str, np.ndarray]]) -> d
 def page(result: dict) -> str:
     lines = []
     for name, motion in result.items():
-        auc = f"; AUC {motion['auc']:.2f} on {motion['real_windows']} real windows" if "auc" in motion else ""
+        auc = ""
+        if "auc" in motion:
+            auc = f"; AUC {motion['auc']:.2f} on {motion['real_windows']} real windows"
+            auc += f", of a simulated robot against the others {motion['own_auc']:.2f}"
         lines += [
             f"{name}{auc}",
             "",
@@ -193,7 +208,7 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="noise_comparison", description=__doc__.splitlines()[0])
     parser.add_argument("log", type=Path, help="LOG278.TXT of pichim/Mini_Segway")
     parser.add_argument("--config", type=Path, default=repository_root() / "config/edumip.toml")
-    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--robots", type=int, default=60)
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="as of equipoise sim")
     parser.add_argument("--json", type=Path, help="write the numbers here")
     given = parser.parse_args(words)
