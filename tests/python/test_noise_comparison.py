@@ -35,6 +35,7 @@ def test_a_robot_unlike_the_others_is_told_from_its_own_population():
     unlike = [noise(seed, keep=keep, seconds=10) for seed, keep in ((1, 0.0), (2, 0.6))]
     assert noise_comparison.own_auc(alike, 9) < 0.75
     assert noise_comparison.own_auc(unlike, 9) > 0.95
+    assert noise_comparison.own_auc(alike[:1], 9) is None
 
 
 def test_real_noise_lies_within_a_factor_of_the_population(root):

@@ -132,7 +132,7 @@ def told_apart(real: np.ndarray, made: np.ndarray, folds: int = 5) -> float:
     return area_under_curve(scores, is_real)
 
 
-def own_auc(runs: list[np.ndarray], windows: int) -> float:
+def own_auc(runs: list[np.ndarray], windows: int) -> float | None:
     """The same of each simulated robot against the others, median: how far a robot of the population gets."""
     made = [features(run) for run in runs]
     aucs = []
@@ -140,7 +140,7 @@ def own_auc(runs: list[np.ndarray], windows: int) -> float:
         others = [other for j, other in enumerate(made) if j != k]
         if others and len(own) >= windows:
             aucs.append(told_apart(own[:windows], np.vstack(others), folds=min(5, windows // 2)))
-    return float(np.median(aucs)) if aucs else float("nan")
+    return float(np.median(aucs)) if aucs else None
 
 
 def each_alone(real: np.ndarray, made: np.ndarray) -> dict[str, float]:
@@ -188,7 +188,8 @@ def page(result: dict) -> str:
         auc = ""
         if "auc" in motion:
             auc = f"; AUC {motion['auc']:.2f} on {motion['real_windows']} real windows"
-            auc += f", of a simulated robot against the others {motion['own_auc']:.2f}"
+            own = motion["own_auc"]
+            auc += "" if own is None else f", of a simulated robot against the others {own:.2f}"
         lines += [
             f"{name}{auc}",
             "",
