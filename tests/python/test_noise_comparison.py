@@ -31,8 +31,9 @@ def test_noise_of_another_size_or_colour_is_told_apart(other):
 
 
 def test_a_robot_unlike_the_others_is_told_from_its_own_population():
-    alike = [noise(seed, seconds=10) for seed in (1, 2)]
-    unlike = [noise(seed, keep=keep, seconds=10) for seed, keep in ((1, 0.0), (2, 0.6))]
+    f = noise_comparison.features
+    alike = [f(noise(seed, seconds=10)) for seed in (1, 2)]
+    unlike = [f(noise(seed, keep=keep, seconds=10)) for seed, keep in ((1, 0.0), (2, 0.6))]
     assert noise_comparison.own_auc(alike, 9) < 0.75
     assert noise_comparison.own_auc(unlike, 9) > 0.95
     assert noise_comparison.own_auc(alike[:1], 9) is None

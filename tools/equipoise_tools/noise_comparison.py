@@ -132,9 +132,8 @@ def told_apart(real: np.ndarray, made: np.ndarray, folds: int = 5) -> float:
     return area_under_curve(scores, is_real)
 
 
-def own_auc(runs: list[np.ndarray], windows: int) -> float | None:
+def own_auc(made: list[np.ndarray], windows: int) -> float | None:
     """The same of each simulated robot against the others, median: how far a robot of the population gets."""
-    made = [features(run) for run in runs]
     aucs = []
     for k, own in enumerate(made):
         others = [other for j, other in enumerate(made) if j != k]
@@ -174,10 +173,11 @@ def compare(real: dict[str, np.ndarray], made: list[dict[str, np.ndarray]]) -> d
         }
         windows = features(samples)
         if name != "rest" and len(windows) >= 4:
-            others = np.vstack([features(run) for run in runs])
+            of_each = [features(run) for run in runs]
+            others = np.vstack(of_each)
             result[name] |= {"real_windows": len(windows), "simulated_windows": len(others)}
             result[name]["auc"] = told_apart(windows, others, folds=min(5, len(windows) // 2))
-            result[name]["own_auc"] = own_auc(runs, len(windows))
+            result[name]["own_auc"] = own_auc(of_each, len(windows))
             result[name]["features"] = each_alone(windows, others)
     return result
 
