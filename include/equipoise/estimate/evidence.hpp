@@ -175,12 +175,19 @@ class Evidence {
   static double squared(const Filter& f, std::size_t row) noexcept {
     return f.row_innovation()[row] * f.row_innovation()[row];
   }
+  /// Of the gyro; 0 where it does not come.
+  static Vec3 gyro_innovation(const Filter& f, const Sample& used) noexcept {
+    Vec3 off = Vec3::Zero();
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (comes(used, i)) off(static_cast<int>(i)) = f.row_innovation()[i];
+    }
+    return off;
+  }
   /// Of the gyro's `axes`, at most.
   static double off_rad_s(const Filter& f, const Sample& used, const std::array<bool, 3>& axes) noexcept {
+    const Vec3 off = gyro_innovation(f, used).cwiseAbs();
     double most = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (axes[i] && comes(used, i)) most = std::max(most, std::abs(f.row_innovation()[i]));
-    }
+    for (std::size_t i = 0; i < 3; ++i) most = std::max(most, axes[i] ? off(static_cast<int>(i)) : 0.0);
     return most;
   }
   static bool comes(const Sample& z, std::size_t row) noexcept {

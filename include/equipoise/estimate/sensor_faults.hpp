@@ -239,9 +239,8 @@ class SensorFaults {
     begin(i, before_);
     Member& m = members_[i];
     const Sample used = used_.of(z);
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (Evidence::comes(used, k)) m.used.bias_rad_s(static_cast<int>(k)) += healthy_.row_innovation()[k];
-    }
+    m.used.bias_rad_s += Evidence::gyro_innovation(healthy_, used);
+    if (kRocks) m.used.bias_rad_s.y() = used_.bias_rad_s.y();  // what that axis reads, the floor may do
     m.filter.doubt_bias(kBias_rad_s);
     m.filter.predict(u);
     m.filter.update(m.used.of(z));
@@ -372,8 +371,9 @@ class SensorFaults {
     } else {
       used_ = m.used;
     }
-    healthy_.adopt(m.settled());
     if (h.kind == FaultHypothesis::kBias) ++jumps_;
+    if (kRocks && h.kind == FaultHypothesis::kBias) used_.bias_rad_s.y() += healthy_.row_innovation()[1];
+    healthy_.adopt(m.settled());
     if (h.kind == FaultHypothesis::kAxis && h.mask == kAhead) rocks_at_ = ticks_;
     tell(hypothesis);
     begin_all();
