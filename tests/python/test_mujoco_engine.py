@@ -200,6 +200,17 @@ def test_what_shows_slowly_is_neither_jump_nor_swap(root, config, floor, robots)
         assert row["verdicts"] == [] and not row["fell"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "drive_mps"), [(1204, 0.0), (1210, 0.2)])
+def test_an_edumip_that_rocks_keeps_its_gyro(root, robot, drive_mps):
+    """One is pushed aside at 8 s, one meets a sill at 7 s."""
+    trial = {"seed": robot, "robot": robot, "yaw_hz": 0.0, "drive_mps": drive_mps, "duration_s": 10.0}
+    trial |= {"floor": "disturbed", "fidelity": "built2025"}
+    row = mujoco_engine.run(trial, str(root / "config/edumip.toml"), [])
+    assert row["ended"] == "finished"
+    assert not row["excluded_healthy"] and row["verdicts"] == []
+
+
 def environment(robot, **options):
     gymnasium = pytest.importorskip("gymnasium")
     name = f"equipoise_robot:Equipoise-{robot.capitalize()}-v0"

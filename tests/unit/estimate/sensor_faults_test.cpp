@@ -132,6 +132,20 @@ TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
   EXPECT_FALSE(gross.trusted());
 }
 
+TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
+  GrossSamples gross({true, false, false});
+  Mip::Sample z;
+  z.imu_ok = true;
+  z.accel_B_m_s2.z() = -kGravity_m_s2;
+  z.gyro_B_rad_s.y() = 5.0;
+  for (int i = 0; i < 20; ++i) {
+    const Mip::Sample used = gross.without(z, Vec3::Zero());
+    EXPECT_TRUE(used.imu_ok);
+    EXPECT_FALSE(used.gyro_axis_ok[1]);
+    EXPECT_FALSE(gross.left_out());
+  }
+}
+
 TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
   GrossSamples gross({true, true, false});
   Sample z = at_rest();
