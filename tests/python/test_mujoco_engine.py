@@ -95,6 +95,30 @@ def test_the_wheeled_robot_answers_tilt_and_torque_as_the_exact_model(root, tmp_
         assert engine.gyro[2] / (n * h) == pytest.approx(qdd[2], rel=0.05, abs=0.05)
 
 
+def test_turning_changes_a_falling_wheeled_robot_as_the_side_force_does(root, tmp_path):
+    """Without it the wheel would be driven against the lean: [T] (A.1) to (A.3)."""
+    yaw, tilt, n = 12.0, 0.1, 3
+    found, expected, without = [], [], []
+    for rate in (0.0, yaw):
+        engine, _, d = engine_of("mip")
+        tilted(engine, tilt)
+        engine.data.qvel[:] = 0.0
+        engine.data.qvel[3:6] = engine.R_WB.reshape(3, 3).T @ [0.0, 0.0, rate]
+        rolls = rate * d["track_m"] / (2 * d["wheel_radius_m"])
+        engine.data.qvel[6:8] = rolls, -rolls
+        start = engine.data.qvel.copy()
+        for _ in range(n):
+            engine.step()
+        change = (engine.data.qvel - start) / (n * d["step_s"])
+        found.append([change[3], change[6:8].mean()])
+        row = {"theta": tilt, "theta_dot": 0.0, "phi_dot": 0.0, "psi_dot": rate, "u_x": 0.0, "u_z": 0.0}
+        expected.append(exact(root, tmp_path, "mip", {**row, "side_force": True})[:2])
+        without.append(exact(root, tmp_path, "mip", row)[:2])
+    found, expected, without = (np.subtract(*reversed(rows)) for rows in (found, expected, without))
+    assert found == pytest.approx(expected, rel=0.05)
+    assert found[1] * without[1] < 0.0
+
+
 @pytest.mark.parametrize("robot", models.ROBOTS)
 def test_a_drag_asks_for_the_lean_of_its_moment_about_the_floor(robot):
     """At the body's centre of mass it would ask for (r + l) / r of that."""
@@ -201,9 +225,9 @@ def test_what_shows_slowly_is_neither_jump_nor_swap(root, config, floor, robots)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("robot", "drive_mps"), [(1204, 0.0), (1210, 0.2)])
+@pytest.mark.parametrize(("robot", "drive_mps"), [(1206, 0.0), (1207, 0.0), (1210, 0.2)])
 def test_an_edumip_that_rocks_keeps_its_gyro(root, robot, drive_mps):
-    """One is pushed aside at 8 s, one meets a sill at 7 s."""
+    """Two are pushed aside at 8 s, one meets a sill at 7 s."""
     trial = {"seed": robot, "robot": robot, "yaw_hz": 0.0, "drive_mps": drive_mps, "duration_s": 10.0}
     trial |= {"floor": "disturbed", "fidelity": "built2025"}
     row = mujoco_engine.run(trial, str(root / "config/edumip.toml"), [])

@@ -25,7 +25,8 @@ nlohmann::json evaluate_mbbr(const MbbrDynamics& dynamics, const nlohmann::json&
           {"accel_B", array_of(dynamics.accelerometer_B(m, a))}};
 }
 
-nlohmann::json evaluate_mip(const MipDynamics& dynamics, const nlohmann::json& row) {
+nlohmann::json evaluate_mip(const nlohmann::json& row) {
+  const MipDynamics dynamics(MipParameters{}, flag_at(row, "side_force"));
   MipMotion m;
   m.theta = number_at(row, "theta");
   m.theta_dot = number_at(row, "theta_dot");
@@ -45,9 +46,7 @@ const std::map<std::string, Row>& models() {
   static const std::map<std::string, Row> all{
       {"mbbr", [dynamics = MbbrDynamics{MbbrParameters{}}](
                    const nlohmann::json& row) { return evaluate_mbbr(dynamics, row); }},
-      {"mip", [dynamics = MipDynamics{MipParameters{}}](const nlohmann::json& row) {
-         return evaluate_mip(dynamics, row);
-       }}};
+      {"mip", evaluate_mip}};
   return all;
 }
 
@@ -59,10 +58,11 @@ void add_model(Subcommand app) {
           .example("equipoise model --robot mbbr --in rows.json --json -");
   auto robot = std::make_shared<std::string>();
   command.option("--robot", *robot, "mbbr or mip").required().one_of({"mbbr", "mip"});
-  add_rows(command,
-           "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
-           "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z}",
-           [=] { return models().at(*robot); });
+  add_rows(
+      command,
+      "rows: mbbr {theta_xy, theta_dot, phi_star_dot, tau_B}, "
+      "mip {theta, theta_dot, phi_dot, psi_dot, u_x, u_z; side_force: true, of rolling, which [T] loses}",
+      [=] { return models().at(*robot); });
 }
 
 }  // namespace equipoise::app

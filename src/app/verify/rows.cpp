@@ -46,6 +46,12 @@ double number_at(const nlohmann::json& row, const std::string& key) {
   return value;
 }
 
+bool flag_at(const nlohmann::json& row, const std::string& key) {
+  if (!row.contains(key)) return false;
+  if (!row[key].is_boolean()) throw InputError(key + ": expected true or false");
+  return row[key].get<bool>();
+}
+
 Eigen::VectorXd numbers_at(const nlohmann::json& row, const std::string& key, Eigen::Index count) {
   if (!row.contains(key)) throw InputError(key + ": missing");
   const nlohmann::json& array = row[key];

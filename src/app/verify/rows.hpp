@@ -17,6 +17,8 @@ using Row = std::function<nlohmann::json(const nlohmann::json&)>;
 void add_rows(const Subcommand& command, const std::string& in_help, const std::function<Row()>& row);
 
 double number_at(const nlohmann::json& row, const std::string& key);
+/// False without it.
+bool flag_at(const nlohmann::json& row, const std::string& key);
 Eigen::VectorXd numbers_at(const nlohmann::json& row, const std::string& key, Eigen::Index count);
 
 nlohmann::json array_of(const Eigen::VectorXd& v);

@@ -17,10 +17,14 @@ Vec3 MipDynamics::accelerations(const MipMotion& m, const Turn& tilt, double tau
   const double m22 = wheels + 2.0 * p_.I_r;
   const double m33 = yaw_inertia(s);
 
+  const double side = side_ * s * m.psi_dot;
+
   const double b1 =
-      s * (C * c * m.psi_dot * m.psi_dot + lm * (kGravity_m_s2 + p_.r * m.theta_dot * m.theta_dot));
-  const double b2 = tau_sum + lm * p_.r * s * m.theta_dot * m.theta_dot;
-  const double b3 = 0.5 * p_.d / p_.r * tau_difference - C * 2.0 * s * c * m.psi_dot * m.theta_dot;
+      s * (C * c * m.psi_dot * m.psi_dot + lm * (kGravity_m_s2 + p_.r * m.theta_dot * m.theta_dot)) +
+      side * m.psi_dot;
+  const double b2 = tau_sum + lm * p_.r * s * m.theta_dot * m.theta_dot + side * m.psi_dot;
+  const double b3 = 0.5 * p_.d / p_.r * tau_difference - C * 2.0 * s * c * m.psi_dot * m.theta_dot -
+                    side * (m.phi_dot + m.theta_dot);
 
   const double det = m11 * m22 - m12 * m12;
   return {(m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det, b3 / m33};

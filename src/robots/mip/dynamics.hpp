@@ -1,7 +1,7 @@
 // Exact dynamics of the two-wheel inverted pendulum.
 // In: lean, rates, torque inputs -> out: accelerations of (theta, phi, psi) and the accelerometer at the
-// body's CoM. Source: [T] (A.1)-(A.4) with its slips corrected (docs/derivation.md). Deterministic, no
-// allocation.
+// body's CoM. Source: [T] (A.1)-(A.4) with its slips corrected, and the side force that keeps the wheels from
+// sliding sideways (docs/derivation.md). Deterministic, no allocation.
 #pragma once
 
 #include "robots/mip/mip.hpp"
@@ -17,7 +17,9 @@ struct MipMotion {
 
 class MipDynamics {
  public:
-  explicit MipDynamics(const MipParameters& p) noexcept : p_(p) {}
+  /// `side_force`: false as [T] and the reference vectors, which lose it.
+  explicit MipDynamics(const MipParameters& p, bool side_force = true) noexcept
+      : p_(p), side_(side_force ? p.m_b * p.l * p.r : 0.0) {}
 
   /// (theta'', phi'', psi'') under the generalised torques of the two motors: `tau_sum` = tau_1 + tau_2 about
   /// the axle, `tau_difference` = tau_1 - tau_2. Wheel angles: phi +- psi d/(2r). (3.17)-(3.18) `tilt`: of
@@ -39,6 +41,7 @@ class MipDynamics {
 
  private:
   MipParameters p_;
+  double side_;  // kg m2
 };
 
 }  // namespace equipoise

@@ -20,7 +20,7 @@ MipCoefficients mip_coefficients(const MipParameters& p, double l_ay, double l_a
   g.g = kGravity_m_s2;
   g.l_ay = l_ay;
   g.l_az = l_az;
-  g.lateral = 0.0;  // as the plant, docs/derivation.md
+  g.lateral = 1.0;  // as the plant, docs/derivation.md
   return generated::mip::coefficients<double>(g);
 }
 

@@ -73,7 +73,7 @@ TEST(MbbrDynamics, EnergyIsConservedWithoutTorqueAndPush) {
 }
 
 TEST(MipDynamics, MatchesTheIndependentDerivation) {
-  const MipDynamics dynamics{MipParameters{}};
+  const MipDynamics dynamics(MipParameters{}, false);
   const auto rows = oracle_rows("mip_dynamics");
   ASSERT_EQ(rows.size(), 200U);
   for (const auto& row : rows) {
