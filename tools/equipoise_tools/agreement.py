@@ -2,7 +2,8 @@
 
     build/venv/bin/python -m equipoise_tools.agreement --config config/mbbr.toml --first-robot 371
 
-Runs what of both campaigns is missing, then counts equal and different verdicts, and compares errors.
+Runs what of both campaigns is missing, then counts equal and different verdicts, and compares errors; and how
+the typical robot moves in both.
 """
 
 from __future__ import annotations
@@ -70,6 +71,46 @@ def compared(own: list[dict], other: list[dict]) -> list[str]:
     return lines
 
 
+def motion_rms(trial: dict, config: str, settings: list[str], engine: str) -> np.ndarray:
+    """Tilt about x and y, rad, and rate of the ball or wheels, rad/s, of the estimate after 5 s."""
+    from equipoise_robot import run
+
+    from .mujoco_engine import run as run_in_mujoco
+
+    ticks = []
+
+    def controller(tick):
+        at = tick.estimate
+        ticks.append((tick.t_s, *at.theta_rad[:2], *at.phi_dot_rad_s))
+        return tick.u_own
+
+    path = str(repository_root() / config)
+    if engine == "mujoco":
+        run_in_mujoco({**trial, "floor": "calm"}, path, settings, controller)
+    else:
+        other = {"robot_number": trial["robot"], "controller": controller, "set": settings}
+        run(path, **{key: value for key, value in trial.items() if key != "robot"}, **other)
+    values = np.array(ticks)
+    return np.sqrt(np.mean(values[values[:, 0] > 5.0, 1:] ** 2, axis=0))
+
+
+def typical(config: str, fidelity: str, runs: list[str], seeds: range) -> list[str]:
+    """RMS over `seeds`: MuJoCo's over ours, and ours."""
+    names = ("tilt x", "tilt y", "rate x", "rate y")
+    lines = [f"| typical robot: yaw Hz, m/s | {' | '.join(names)} |", "|---|---|---|---|---|"]
+    for text in runs:
+        yaw, drive = map(float, text.split(","))
+        rms = {}
+        for engine, settings in (("own", calm(config, fidelity)), ("mujoco", [])):
+            trial = {"robot": 0, "yaw_hz": yaw, "drive_mps": drive, "duration_s": 20.0, "fidelity": fidelity}
+            squares = [motion_rms({**trial, "seed": seed}, config, settings, engine) ** 2 for seed in seeds]
+            rms[engine] = np.sqrt(np.mean(squares, axis=0))
+        pairs = zip(rms["own"], rms["mujoco"], strict=True)
+        cells = [f"{there / here:.2f} of {here:.3g}" if here > 0.0 else "-" for here, there in pairs]
+        lines.append(f"| {yaw:g}, {drive:g} | {' | '.join(cells)} |")
+    return [*lines, ""]
+
+
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="agreement", description=__doc__.splitlines()[0])
     parser.add_argument("--config", default="config/mbbr.toml")
@@ -96,7 +137,7 @@ def main(words: list[str] | None = None) -> int:
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print("\n".join(compared(*rows)))
+    print("\n".join([*typical(given.config, given.fidelity, given.runs, range(1, 5)), *compared(*rows)]))
     return 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import subprocess
+from collections import Counter
 from datetime import date
 from pathlib import Path
 
@@ -203,15 +204,62 @@ def engine_of(settings: dict) -> str:
     return f" in MuJoCo, {settings['floor']} floor" if settings.get("engine") == "mujoco" else ""
 
 
+def reasons_table(rows: list[dict]) -> list[str]:
+    counts = Counter(why(row) for row in rows if row["fell"])
+    return [
+        "| reasons | trials |",
+        "|---|---|",
+        *(f"| {reason} | {n} |" for reason, n in counts.most_common()),
+    ]
+
+
+def sensitivity_table(rows: list[dict], worse: np.ndarray) -> list[str]:
+    strongest = [i for i in influences(drawn_of(rows), worse) if abs(i.z) > 2.0][:10]
+    return [
+        "| imperfection | measure | effect | standard deviations |",
+        "|---|---|---|---|",
+        *[f"| `{i.name}` | {i.measure} | {i.effect:.2f} | {i.z:+.1f} |" for i in strongest],
+    ]
+
+
+def sensitivity(rows: list[dict]) -> list[str]:
+    """Which imperfection kills, and which is only doubted."""
+    worse, name = worse_half(rows)
+    lines = [
+        f"The {name} against the others. Effect: chance that one of them has more of it (0.5: no matter).",
+        "",
+        *sensitivity_table(rows, worse),
+    ]
+    upright = [row for row in rows if not row["fell"]]
+    doubted = np.array([bool(row.get("excluded_healthy")) for row in upright], dtype=bool)
+    if doubted.any() and not doubted.all():
+        lines += ["", "Of the upright, those that lost a healthy sensor against the others:", ""]
+        lines += sensitivity_table(upright, doubted)
+    return lines
+
+
+def worst_cases(rows: list[dict], settings: dict, how_many: int) -> list[str]:
+    worst = sorted((row for row in rows if row["fell"]), key=lambda row: row["fell_at_s"])
+    upright = (row for row in rows if not row["fell"])
+    worst += sorted(upright, key=lambda row: -(row["attitude_rmse_rad"] or 0.0))
+    lines = []
+    for row in worst[:how_many]:
+        what = f"fell at {row['fell_at_s']:.2f} s ({why(row)})" if row["fell"] else "upright"
+        attitude = row["attitude_rmse_rad"]
+        errors = "" if row["fell"] or attitude is None else f", attitude {attitude:.4f} rad"
+        lines.append(f"- robot {row['robot']}: {what}{errors}: `{replay_command(row, settings)}`")
+    return lines
+
+
 def page(rows: list[dict], settings: dict) -> str:
     robots = len({row["robot"] for row in rows})
-    fell = [row for row in rows if row["fell"]]
+    fell = sum(row["fell"] for row in rows)
     lines = [
         "# Campaign",
         f"{len(rows)} trials of {robots} robots drawn from `[population]` of {settings['config']}, world "
         f"`{settings['fidelity']}`{engine_of(settings)}, "
         f"{settings['duration_s']:g} s each; version {settings['version']}. "
-        f"{len(rows) - len(fell)} upright to the end, {len(fell)} not.",
+        f"{len(rows) - fell} upright to the end, {fell} not.",
         "",
         made_by(rows, settings),
         "",
@@ -225,35 +273,9 @@ def page(rows: list[dict], settings: dict) -> str:
         "",
     ]
     if fell:
-        counts: dict[str, int] = {}
-        for row in fell:
-            reason = why(row)
-            counts[reason] = counts.get(reason, 0) + 1
-        lines += ["## Why the motors went off", "| reasons | trials |", "|---|---|"]
-        lines += [f"| {reason} | {n} |" for reason, n in sorted(counts.items(), key=lambda item: -item[1])]
-        lines.append("")
-    worse, name = worse_half(rows)
-    strongest = [i for i in influences(drawn_of(rows), worse) if abs(i.z) > 2.0][:10]
-    lines += [
-        "## Which imperfection it is",
-        f"The {name} against the others. Effect: chance that one of them has more of it (0.5: no matter).",
-        "",
-        "| imperfection | measure | effect | standard deviations |",
-        "|---|---|---|---|",
-        *[f"| `{i.name}` | {i.measure} | {i.effect:.2f} | {i.z:+.1f} |" for i in strongest],
-        "",
-        "![sensitivity](sensitivity.png)",
-        "",
-        "## Worst cases",
-    ]
-    survivors = [row for row in rows if not row["fell"]]
-    worst = sorted(fell, key=lambda row: row["fell_at_s"])
-    worst += sorted(survivors, key=lambda row: -(row["attitude_rmse_rad"] or 0.0))
-    for row in worst[:WORST]:
-        what = f"fell at {row['fell_at_s']:.2f} s ({why(row)})" if row["fell"] else "upright"
-        attitude = row["attitude_rmse_rad"]
-        errors = "" if row["fell"] or attitude is None else f", attitude {attitude:.4f} rad"
-        lines.append(f"- robot {row['robot']}: {what}{errors}: `{replay_command(row, settings)}`")
+        lines += ["## Why the motors went off", *reasons_table(rows), ""]
+    lines += ["## Which imperfection it is", *sensitivity(rows), "", "![sensitivity](sensitivity.png)", ""]
+    lines += ["## Worst cases", *worst_cases(rows, settings, WORST)]
     return "\n".join(lines) + "\n"
 
 

@@ -12,6 +12,7 @@ import functools
 import json
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -56,8 +57,8 @@ def no_random_pushes(config: str, fidelity: str) -> tuple[str, ...]:
     return (f"{table}.every_s=0",) if table in configuration(Path(config)) else ()
 
 
-def run(trial: dict, config: str, settings: list[str]) -> dict:
-    """One trial as `equipoise trials` has it, on a calm or a disturbed floor."""
+def run(trial: dict, config: str, settings: list[str], controller: Callable | None = None) -> dict:
+    """One trial as `equipoise trials` has it, on a calm or a disturbed floor; `controller`: one's own."""
     from equipoise_robot import _core
 
     floor, world = (
@@ -77,7 +78,7 @@ def run(trial: dict, config: str, settings: list[str]) -> dict:
         engine = Engine(models.mjcf(robot, json.loads(dimensions), floor), inputs, outputs)
         return engine.start, engine.step
 
-    return json.loads(_core.run_in_engine(request, make))
+    return json.loads(_core.run_in_engine(request, make, controller))
 
 
 def judged(trial: dict, config: str, settings: list[str], twins: bool) -> dict:
