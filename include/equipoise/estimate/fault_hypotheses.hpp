@@ -134,7 +134,8 @@ constexpr auto fault_rows() noexcept {
   return rows;
 }
 
-/// What was weighed in a tick. Ratios are log-likelihoods over what is used, prior included, in nats.
+/// What was weighed in a tick. Ratios are log-likelihoods over what is used, less what is rarer than others,
+/// in nats.
 struct FaultEvidence {
   std::int32_t leading = -1;  // row of kFaultNames; -1: none
   double ratio = 0.0;

@@ -3,8 +3,7 @@
 // refuted (CUSUM: Page 1954); beyond a bound, which a rate of false alarms gives (Lorden 1971), the one that
 // leads all others by a margin changes which sensors are used; else none is trusted. Slipping and pushes are
 // hypotheses, too, of healthy robots. Derivation and constants: docs/faults.md. In: input, Measurement ->
-// out: the control's filter, which sensors it uses, whether they can be trusted. RT-safe. Filter: predict,
-// update, adopt, row_innovation, row_variance, wheel_angle_rad, doubt_bias, allow_push and its like.
+// out: the control's filter, which sensors it uses, whether they can be trusted. Filter: its EKF. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -144,11 +143,10 @@ class SensorFaults {
   }
 
   void begin_all() noexcept {
-    for (std::size_t i = 0; i < kCount; ++i) begin(i, healthy_);
+    for (std::size_t i = 0; i < kCount; ++i) begin(i, healthy_, healthy_);
     stale_ = suspects_ = false;
     undecided_ = leads_for_ = 0;
   }
-  void begin(std::size_t i, const Filter& from) noexcept { begin(i, from, from); }
   /// `state`: that, or what it has predicted since, which is the same for all.
   void begin(std::size_t i, const Filter& from, const Filter& state) noexcept {
     const FaultHypothesis& h = kHypotheses[i];
@@ -236,7 +234,7 @@ class SensorFaults {
   }
 
   void jumped(std::size_t i, const Input& u, const Sample& z, double ratio) noexcept {
-    begin(i, before_);
+    begin(i, before_, before_);
     Member& m = members_[i];
     const Sample used = used_.of(z);
     m.used.bias_rad_s += Evidence::gyro_innovation(healthy_, used);
@@ -318,7 +316,9 @@ class SensorFaults {
       runner_up = i;
     }
     const int next = runner_up == best ? -1 : kRows[runner_up];
-    evidence_ = {kRows[best], weight[best], kBound, next, second, false, evidence_.verdicts};
+    const auto told = [&](std::size_t i) { return std::min(weight[i], members_[i].ratio); };
+    evidence_ = {kRows[best], told(best),        kBound, next, next < 0 ? 0.0 : told(runner_up),
+                 false,       evidence_.verdicts};
     leads_for_ = best == leader_ && weight[best] > kBound ? leads_for_ + 1 : 0;
     leader_ = best;
     if (!(weight[best] > kBound)) {
@@ -356,7 +356,7 @@ class SensorFaults {
       control.adopt(healthy_);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.depart(ratio, -kMargin);
-    begin(event, healthy_);
+    begin(event, healthy_, healthy_);
     undecided_ = 0;
     event_at_ = ticks_;
   }
