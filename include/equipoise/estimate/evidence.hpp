@@ -81,13 +81,14 @@ class Evidence {
       faulty_[row] = (stands_[row] ? log_stands_ : log_turns_)[stood];
     }
     double misfit = 0.0;
-    shaken_most_ = 0.0;
+    shaken_most_ = within_ = 0.0;
     const double density = log_density(f, used, came, [&](std::size_t row, double width, double says) {
       per_area_[row] = 1.0 / (2.0 * kPi * spread(f, row));
       width_[row] = width - 1.0;
       const double peak = -0.5 * width;
       peak_[row] = stands_[row] ? std::max(peak, log_still_) : peak;
       misfit += peak_[row] - says;
+      if (row >= kWheelRow && row < kAccelRow && peak_[row] - says < 0.5) within_ += peak_[row] - says;
       shaken_most_ += std::max(shaken_[row] - peak_[row], 0.0);
     });
     expected_ = density + misfit;
@@ -101,6 +102,9 @@ class Evidence {
   /// expect()'s filter has lost its way, or its variances were widened: most() does not hold for those of
   /// before.
   bool knows_less() const noexcept { return knows_less_; }
+  /// What it loses by wheels that are off by less than a standard deviation, as an eduMIP's are for long
+  /// where the floor slopes: one that falls is off by more.
+  double within_a_sigma() const noexcept { return within_; }
   /// What a filter could say of this tick at most that uses some rows of `all`, and so is surer of none: it
   /// need not run to be refuted.
   double most(const Sample& all, const Sample& used, const Sample& came) const noexcept {
@@ -329,6 +333,7 @@ class Evidence {
   std::array<double, kRows> per_area_{};  // 1 / (2 pi variance)
   std::array<double, kRows> width_{};     // log(2 pi variance) - 1
   double shaken_most_ = 0.0;              // what could be above it
+  double within_ = 0.0;
   std::array<double, kRows> variance_{};  // a tick ago
   bool knows_less_ = true;
   // Log densities of a faulty encoder that turns, or stands still, by whether it stood a tick ago.

@@ -163,8 +163,7 @@ class SensorFaults {
     m.ratio = h.waits() ? -kMargin : 0.0;
     m.since = ticks_;
     m.from_start = ticks_ <= kArmingTicks;
-    m.returns = -1;
-    if (wheel_returns) m.returns = Model::kWheel + h.first();
+    m.returns = wheel_returns ? Model::kWheel + h.first() : -1;
     if (h.kind == FaultHypothesis::kAxis && (used_.without_axes & ~rocking() & h.mask) != 0)
       m.returns = h.first();
     if (m.returns >= 0) m.from = Evidence::reading(weigh_.before(), static_cast<std::size_t>(m.returns));
@@ -216,6 +215,7 @@ class SensorFaults {
     const Sample used = m.used.of(z);
     m.innovate(used);
     double gain = weigh_(m.filter, used, z) - as_used;
+    if (kRocks && h.kind == FaultHypothesis::kSwap) gain -= weigh_.within_a_sigma();
     if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
     // A fault beside which a wheel still has to slip explains nothing; only swapped axes make a robot slip.
     const bool explains = h.healthy() || h.kind == FaultHypothesis::kSwap || !m.filter.slipped();
