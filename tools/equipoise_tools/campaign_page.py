@@ -112,12 +112,12 @@ ERRORS = (
 )
 
 
-def error_table(rows: list[dict]) -> list[str]:
+def error_table(rows: list[dict], errors=ERRORS) -> list[str]:
     """Of the upright: median and 95th percentile over the trials, each with its 95 % interval."""
     lines = ["| yaw Hz | m/s | error | median | 95th percentile |", "|---|---|---|---|---|"]
     for yaw, drive in points_of(rows):
         upright = [row for row in at_point(rows, (yaw, drive)) if not row["fell"]]
-        for key, name, scale, form in ERRORS:
+        for key, name, scale, form in errors:
             values = scale * np.abs(_column(upright, key))
             values = values[np.isfinite(values)]
             if len(values) == 0:
