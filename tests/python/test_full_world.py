@@ -3,6 +3,7 @@
 import tomllib
 
 from equipoise_tools import agreement, full_world
+from equipoise_tools.trials import run_trials
 
 
 def leaves(table, prefix=""):
@@ -101,3 +102,10 @@ def test_wheels_that_slip_are_no_fault(tmp_path):
     trials = full_world.Trials(tmp_path, range(8441, 8481))
     rows = [row for yaw_hz in (1.0, 2.0) for row in trials.run("mbbr", "firmware", (yaw_hz, 0.2))]
     assert sum(row["excluded_healthy"] for row in rows) <= 11  # of 80; 16 when that spoke for it
+
+
+def test_a_slope_speaks_for_no_swapped_axes():
+    """An eduMIP that turns on one has its wheels off by a little for seconds."""
+    common = {"yaw_hz": 0.5, "drive_mps": 0.3, "duration_s": 14.0, "fidelity": "built2025"}
+    asked = [{"robot": robot, "seed": robot, **common} for robot in (15103, 15122, 15145)]
+    assert [row["ended"] for row in run_trials("config/edumip.toml", asked)] == ["finished"] * 3
