@@ -1,5 +1,7 @@
 """Every effect of the population can be turned off; two engines' verdicts are compared run by run."""
 
+import json
+import subprocess
 import tomllib
 
 from equipoise_tools import agreement, full_world
@@ -109,3 +111,21 @@ def test_a_slope_speaks_for_no_swapped_axes():
     common = {"yaw_hz": 0.5, "drive_mps": 0.3, "duration_s": 14.0, "fidelity": "built2025"}
     asked = [{"robot": robot, "seed": robot, **common} for robot in (15103, 15122, 15145)]
     assert [row["ended"] for row in run_trials("config/edumip.toml", asked)] == ["finished"] * 3
+
+
+def test_a_bias_that_jumps_takes_gyro_y_with_it(root):
+    """y does not tell of it, but what it reads since would be taken for a robot that rolls on and on."""
+    command = [
+        root / "build/host/equipoise",
+        "campaign",
+        "--config",
+        root / "config/edumip.toml",
+        "--json",
+        "-",
+    ]
+    command += ["--robot", "1721", "--robots", "12", "--fidelity", "built2025", "--fault", "bias_jump"]
+    command += ["--phase", "balancing", "--phase", "spinning"]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    cases = json.loads(done.stdout)["cases"]
+    assert len(cases) == 24
+    assert sum(case["upright"] for case in cases) >= 18  # 21; 12 where y stays
