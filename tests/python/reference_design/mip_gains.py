@@ -55,11 +55,11 @@ def parameters() -> dict:
 
 
 @lru_cache(maxsize=4)
-def _coefficients(lateral: float = 0.0) -> dict:
+def _coefficients(lateral: float = 1.0) -> dict:
     return mip_header.model().numbers(parameters() | {"lateral": lateral})
 
 
-def planar_system(yaw_rate: float = 0.0, lateral: float = 0.0):
+def planar_system(yaw_rate: float = 0.0, lateral: float = 1.0):
     """(A, b) of (theta, phi, theta', phi') and u_x, about upright at a constant yaw rate."""
     c = _coefficients(lateral)
     A, b = np.zeros((4, 4)), np.zeros((4, 1))
@@ -143,7 +143,7 @@ def yaw_gains() -> tuple:
     return tuple(lqr.lqr(A, b, [w["psi_rad"] ** -2, w["psi_dot_rad_s"] ** -2], [w["u_z"] ** -2])[0])
 
 
-def margins(controller: str, yaw_rate: float, lateral: float = 0.0, late_ticks: int = 1) -> lqr.Margins:
+def margins(controller: str, yaw_rate: float, lateral: float = 1.0, late_ticks: int = 1) -> lqr.Margins:
     """At u, with the input already `late_ticks` late; controller: slc, published, lqr."""
     rate = PUBLISHED.rate_hz if controller == "published" else 1 / TICK_S
     A, b = lqr.sampled(*planar_system(yaw_rate, lateral), 1 / rate)

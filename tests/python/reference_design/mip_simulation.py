@@ -25,7 +25,7 @@ COUNT_RAD = 2 * np.pi / (60 * 35.577)  # eduMIP encoder
 class Scenario:
     controller: str  # slc, published (run at 100 Hz), lqr
     yaw_rad_s: float = 0.0
-    lateral: float = 0.0
+    lateral: float = 1.0
     coulomb_N_m: float = 0.0  # per motor
     delay_ticks: int = 0
     tilt_rad: float = 0.1  # at the start
