@@ -105,7 +105,7 @@ def test_the_page_tells_shares_and_how_to_see_the_worst_again(tmp_path):
     )
     assert "--set friction.compensation=0.9" in first
     assert "| `mount` |" in text
-    assert "Of the upright" not in text  # no twin has looked
+    assert "Of the upright" not in text
     for number, one in enumerate(rows):
         one["excluded_healthy"], one["drawn"]["shaken"] = number >= 15, float(number >= 15)
     doubted = campaign_page.page(rows, SETTINGS).partition("Of the upright")[2].partition("## Worst")[0]
