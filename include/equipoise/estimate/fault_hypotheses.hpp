@@ -50,8 +50,11 @@ struct FaultHypothesis {
   constexpr bool wiring() const noexcept { return kind == kReversed || kind == kSwap; }
 };
 
-/// `Rocks`: about the axis ahead, whose gyro then tells of the floor.
-template <int Wheels, bool Rocks = Wheels == 2>
+/// A robot on two wheels rocks about y, the axis ahead, whose gyro then tells of the floor.
+template <int Wheels>
+inline constexpr bool kRocksOn = Wheels == 2;
+
+template <int Wheels, bool Rocks = kRocksOn<Wheels>>
 constexpr auto fault_hypotheses() noexcept {
   constexpr int kPairs = Wheels * (Wheels - 1) / 2;
   std::array<FaultHypothesis, static_cast<std::size_t>(2 * Wheels + kPairs + 3 + 3 + (Rocks ? 9 : 7))> all{};

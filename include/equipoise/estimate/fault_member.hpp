@@ -67,7 +67,7 @@ struct FaultMember {
     if (h.pushes()) filter.allow_push(kPush_N);
     if (h.kind == FaultHypothesis::kSpin) filter.allow_spin(kSlip_rad);
     if (h.kind == FaultHypothesis::kSlip || h.kind == FaultHypothesis::kRock) filter.allow_slip(kSlip_rad);
-    if constexpr (Wheels == 2) {
+    if constexpr (kRocksOn<Wheels>) {
       if (h.kind == FaultHypothesis::kRock) filter.allow_hit(kPush_N);
     }
   }

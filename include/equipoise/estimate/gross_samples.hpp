@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "equipoise/estimate/fault_hypotheses.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
@@ -26,7 +27,7 @@ class GrossSamples {
     Measurement<Wheels> z = raw;
     const Vec3 away = z.gyro_B_rad_s - expected_rad_s;
     Vec3 explained = away;
-    if (Wheels == 2) explained.y() = 0.0;  // pushed aside, it rocks about that axis as fast as it may
+    if (kRocksOn<Wheels>) explained.y() = 0.0;  // pushed aside, as fast as it may
     const bool gross = z.imu_ok && !(explained.norm() < kGross_rad_s && z.accel_B_m_s2.norm() < kGross_m_s2);
     gross_ = gross ? gross_ + 1 : 0;
     if (gross && gross_ <= kGlitch) z.imu_ok = false;

@@ -105,7 +105,7 @@ class SensorFaults {
   using Used = UsedSensors<Wheels>;
   using Member = FaultMember<Filter, Wheels>;
   static constexpr auto kRows = fault_rows<Wheels>();
-  static constexpr bool kRocks = Wheels == 2;
+  static constexpr bool kRocks = kRocksOn<Wheels>;
   static constexpr std::uint32_t kAhead = 1U << 1;  // the gyro's axis about which it rocks
 
   // Decisions, in nats. A false alarm in ten hours of ticks and sixteen hypotheses: ln(7.2e6 * 16)
