@@ -144,6 +144,13 @@ double DriveCoastCommand::mean_current(double omega_r) const noexcept {
   return sign_ * 2.0 * (v_ * d - b / T_r_ * std::log1p(d / b * drained_));  // (4.30)
 }
 
+// Volt-seconds over a period balance as without drop at another speed and on another scale of current.
+double DriveCoastCommand::mean_current(double omega_r, double opposing) const noexcept {
+  const double scale = 0.5 * (1.0 + opposing);
+  const double shifted = std::clamp(omega_r, -1.0, 1.0) + sign_ * (scale - 1.0);
+  return scale * mean_current(shifted / scale);
+}
+
 double drive_coast_mean_current(double T_r, double omega_r, double u) noexcept {
   return DriveCoastCommand(T_r, u).mean_current(omega_r);
 }

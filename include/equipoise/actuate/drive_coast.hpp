@@ -17,6 +17,8 @@ class DriveCoastCommand {
   DriveCoastCommand() = default;
   DriveCoastCommand(double T_r, double u) noexcept;
   double mean_current(double omega_r) const noexcept;
+  /// With diodes that drop V_d: `opposing` (V + 2 V_d) / V instead of 1. From [T] (4.1), (4.5).
+  double mean_current(double omega_r, double opposing) const noexcept;
 
  private:
   double T_r_ = 0.0;

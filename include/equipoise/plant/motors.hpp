@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "equipoise/actuate/bridge.hpp"
-#include "equipoise/plant/diode_drop.hpp"
 #include "equipoise/plant/world.hpp"
 #include "equipoise/samples.hpp"
 
@@ -45,10 +44,8 @@ class SimulatedMotors {
       const double duty = calibration_.motor_sign[i] * command_.duty[i];
       if (motor_.bridge == BridgeType::kDriveBrake) {
         brake_[i] = duty;
-      } else if (diode_drop_V_ == 0.0) {
-        coast_[i] = DriveCoastCommand(motor_.T_r(), duty);
       } else {
-        coast_with_drop_[i] = DriveCoastDropCommand(motor_.T_r(), duty);
+        coast_[i] = DriveCoastCommand(motor_.T_r(), duty);
       }
     }
   }
@@ -85,8 +82,7 @@ class SimulatedMotors {
   double mean_current(std::size_t i, double wheel_rate_rad_s) const noexcept {
     const double omega_r = wheel_rate_rad_s / no_load_rad_s_;
     if (motor_.bridge == BridgeType::kDriveBrake) return brake_[i] - omega_r;
-    if (diode_drop_V_ == 0.0) return coast_[i].mean_current(omega_r);
-    return coast_with_drop_[i].mean_current(omega_r, diodes_oppose_);
+    return coast_[i].mean_current(omega_r, diodes_oppose_);
   }
   /// What follows from the battery's voltage.
   void supplied() noexcept {
@@ -108,7 +104,6 @@ class SimulatedMotors {
   // The commands held, each of one kind of bridge: the integrator asks at many speeds per command.
   std::array<double, N> brake_{};
   std::array<DriveCoastCommand, N> coast_{};
-  std::array<DriveCoastDropCommand, N> coast_with_drop_{};
 };
 
 }  // namespace equipoise

@@ -110,8 +110,8 @@ TEST(MbbrDisturbance, DiodeDropMatchesTheSwitchingMotor) {
         motor.period(u, kSupply_V);
         const double mean = (motor.charge_C() - before) * hz * p.resistance_ohm / kSupply_V;
         const double opposing = 1.0 + 2.0 * p.diode_drop_V / kSupply_V;
-        EXPECT_NEAR(DriveCoastDropCommand(T_r, u).mean_current(omega_r, opposing), mean, 1e-10);
-        EXPECT_NEAR(DriveCoastDropCommand(T_r, u).mean_current(omega_r, 1.0),
+        EXPECT_NEAR(DriveCoastCommand(T_r, u).mean_current(omega_r, opposing), mean, 1e-10);
+        EXPECT_NEAR(DriveCoastCommand(T_r, u).mean_current(omega_r, 1.0),
                     drive_coast_mean_current(T_r, omega_r, u), 1e-12);
       }
     }
