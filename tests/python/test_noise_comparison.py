@@ -48,7 +48,8 @@ def test_real_noise_lies_within_a_factor_of_the_population(root):
         noise_comparison.simulated_motions(binary, root / "config/edumip.toml", robot)
         for robot in (1, 2, 3, 4)
     ]
-    result = noise_comparison.compare(noise_comparison.real_motions(log), made)
+    real = noise_comparison.real_motions(binary, log, root / "config/real/maps/mini_segway_log278.toml")
+    result = noise_comparison.compare(real, made)
     # The chip at rest and the robot standing: a gross error of unit, frame or shape is a factor of ten.
     for motion in ("rest", "standing"):
         for axis, row in result[motion]["quantities"].items():

@@ -1,8 +1,7 @@
-"""Noise of gyro and accelerometer: a real log beside simulated eduMIPs of the population.
+"""Noise of gyro and accelerometer: a real log beside simulated robots of its configuration's population.
 
-At rest, standing and rolling: per quantity the real value and the simulated range, and how well a linear
-discriminant tells windows of one second apart (area under its ROC curve, 0.5: not at all). The real log:
-pichim/Mini_Segway, docs/matlab/LOG278.TXT.
+At rest, standing and rolling, as far as the log has it: per quantity the real value and the simulated range,
+and how well a linear discriminant tells windows of one second apart (area under its ROC curve, 0.5: not at all).
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import sys
 import tempfile
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from equipoise_robot import channels as ch
@@ -23,35 +23,40 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.stats import kurtosis, rankdata
 
 from .foreign_log import configuration
-from .paths import UserError, binary, repository_root
+from .paths import UserError, binary
 
 HZ = 200
 HIGH_PASS_HZ = 20.0
 AXES = [f"{sensor} {axis}" for sensor in ("gyro", "accelerometer") for axis in "xyz"]
-LOGGED_HZ, FILTER_HZ = 1000, 60.0  # of LOG278; the robot passed its samples through a first-order filter
-MOTIONS = {
-    "rest": (0.1, 2.0),
-    "standing": (14.8, 20.2),
-    "rolling": (2.9, 5.4),
-}  # s; rolling: on casters
-ROLLING_RAD_S = 14.8  # of its wheels then
+MOTIONS = {  # s; rolling: on casters
+    "mini_segway_log278": {"rest": (0.1, 2.0), "standing": (14.8, 20.2), "rolling": (2.9, 5.4)},
+    "regbot_bal_log_2": {"standing": (0.45, 3.05)},
+}
+ROLLING_RAD_S = 14.8  # of the Mini Segway's wheels then
 
 
-def segway(path: Path) -> np.ndarray:
-    """Gyro, rad/s, and accelerometer, m/s^2, as the chip gave them: the robot's filter is taken back."""
-    raw = path.read_bytes()
-    columns = raw[0]
-    values = np.frombuffer(raw[1:], "<f4")
-    values = values[: values.size // columns * columns].reshape(-1, columns).astype(float)
-    filtered = values[:, 9:15]
-    gain = 1.0 - np.exp(-2.0 * np.pi * FILTER_HZ / LOGGED_HZ)
-    chip: np.ndarray = np.vstack([filtered[:1], (filtered[1:] - (1.0 - gain) * filtered[:-1]) / gain])
-    return chip
+def imu(log: Path, calibration: dict[str, Any]) -> np.ndarray:
+    """Gyro, rad/s, and accelerometer, m/s^2, body axes, before bias and scale are taken off."""
+    records = Log(log)[ch.SENSORS]
+    turned = np.reshape(calibration["R_BS"], (3, 3)).T
+    gyro = records["gyro_counts"] / calibration["gyro_counts_per_deg_s"] * np.pi / 180.0
+    accel = records["accel_counts"] / calibration["accel_counts_per_g"] * 9.81
+    return np.hstack([gyro @ turned, accel @ turned])
 
 
-def real_motions(path: Path) -> dict[str, np.ndarray]:
-    picked = segway(path)[:: LOGGED_HZ // HZ]  # as a loop of 200 Hz reads it
-    return {name: picked[int(HZ * begin) : int(HZ * end)] for name, (begin, end) in MOTIONS.items()}
+def real_motions(program: Path, table: Path, map_file: Path) -> dict[str, np.ndarray]:
+    if map_file.stem not in MOTIONS:
+        raise UserError(f"{map_file}: its motions are not known; known: {', '.join(MOTIONS)}")
+    calibration = configuration(map_file.parent / tomllib.loads(map_file.read_text())["robot"])["calibration"]
+    with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
+        log = Path(folder) / "real.lcm"
+        call = [str(program), "import", str(table), "--map", str(map_file), "-o", str(log), "--json", "-"]
+        done = subprocess.run(call, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise UserError(done.stderr.strip())
+        samples = imu(log, calibration)
+    times = MOTIONS[map_file.stem]
+    return {name: samples[int(HZ * begin) : int(HZ * end)] for name, (begin, end) in times.items()}
 
 
 def simulated(program: Path, config: Path, robot: int, settings: list[str], words: str) -> np.ndarray:
@@ -65,12 +70,7 @@ def simulated(program: Path, config: Path, robot: int, settings: list[str], word
         done = subprocess.run(call, capture_output=True, text=True, check=False)
         if done.returncode not in (0, 1):  # 1: fell
             raise UserError(done.stderr.strip())
-        records = Log(log)[ch.SENSORS]
-    calibration = tomllib.loads(config.read_text())["calibration"]
-    turned = np.reshape(calibration["R_BS"], (3, 3)).T
-    gyro = records["gyro_counts"] / calibration["gyro_counts_per_deg_s"] * np.pi / 180.0
-    accel = records["accel_counts"] / calibration["accel_counts_per_g"] * 9.81
-    return np.hstack([gyro @ turned, accel @ turned])
+        return imu(log, configuration(config)["calibration"])
 
 
 def simulated_motions(
@@ -207,8 +207,8 @@ def page(result: dict) -> str:
 
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="noise_comparison", description=__doc__.splitlines()[0])
-    parser.add_argument("log", type=Path, help="LOG278.TXT of pichim/Mini_Segway")
-    parser.add_argument("--config", type=Path, default=repository_root() / "config/edumip.toml")
+    parser.add_argument("log", type=Path, help="the real robot's")
+    parser.add_argument("--map", type=Path, required=True, help="its map: config/real/maps")
     parser.add_argument("--robots", type=int, default=60)
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="as of equipoise sim")
     parser.add_argument("--json", type=Path, help="write the numbers here")
@@ -217,8 +217,10 @@ def main(words: list[str] | None = None) -> int:
         parser.error(f"{given.log}: cannot be opened")
     program = binary()
     robots = range(1, given.robots + 1)
-    made = [simulated_motions(program, given.config, robot, given.set) for robot in robots]
-    result = compare(real_motions(given.log), made)
+    real = real_motions(program, given.log, given.map)
+    config = given.map.parent / tomllib.loads(given.map.read_text())["robot"]
+    made = [simulated_motions(program, config, robot, given.set) for robot in robots]
+    result = compare(real, made)
     if given.json:
         given.json.write_text(json.dumps(result, indent=1) + "\n")
     print(page(result))
