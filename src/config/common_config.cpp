@@ -45,7 +45,8 @@ MotorParameters read_motor(Section s) {
   m.pwm_hz = s.number("pwm_hz", 100.0, 100e3);
   m.nominal_V = s.number("nominal_V", 1.0, 60.0);
   m.bridge = s.choice("bridge", kBridgeNames) == 0 ? BridgeType::kDriveBrake : BridgeType::kDriveCoast;
-  if (s.has("invert_bridge")) m.invert_bridge = s.boolean("invert_bridge");  // logs before it: true
+  if (s.has("bridge_lost_s")) m.bridge_lost_s = s.number("bridge_lost_s", 0.0, 1e-4);  // older logs: 0
+  if (s.has("invert_bridge")) m.invert_bridge = s.boolean("invert_bridge");            // logs before it: true
   s.finish();
   return m;
 }

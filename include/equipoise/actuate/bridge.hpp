@@ -19,11 +19,13 @@ struct MotorParameters {
   double inductance_H = 0.585e-3;
   double pwm_hz = 20e3;
   double nominal_V = 8.0;
+  double bridge_lost_s = 0.0;  // of each period, while the outputs switch: on delay less off delay
   BridgeType bridge = BridgeType::kDriveCoast;
   bool invert_bridge = true;  // false: a linear bridge's duty, whatever the bridge; [T] section 4.6
 
   double stall_current_A(double supply_V) const noexcept { return supply_V / resistance_ohm; }
   double no_load_rad_s(double supply_V) const noexcept { return supply_V / torque_constant_N_m_A; }
+  double lost_duty() const noexcept { return bridge_lost_s * pwm_hz; }
   double T_r() const noexcept { return resistance_ohm / (inductance_H * pwm_hz); }
   double k1() const noexcept { return torque_constant_N_m_A * stall_current_A(nominal_V); }  // (5.12)
   double k2() const noexcept { return torque_constant_N_m_A * torque_constant_N_m_A / resistance_ohm; }
@@ -49,7 +51,8 @@ class Bridge {
     if (motor_.bridge == BridgeType::kDriveBrake || !motor_.invert_bridge) return saturate(scaled);
     const double omega_r = wheel_rate_rad_s / motor_.no_load_rad_s(supply);
     if (!std::isfinite(scaled - omega_r)) return scaled - omega_r;  // for the safety gate to see
-    return inverse_.solve(std::clamp(omega_r, -1.0, 1.0), scaled - omega_r).u;
+    const double duty = inverse_.solve(std::clamp(omega_r, -1.0, 1.0), scaled - omega_r).u;
+    return duty == 0.0 ? duty : saturate(duty + std::copysign(motor_.lost_duty(), duty));
   }
 
   static double saturate(double u) noexcept { return u > 1.0 ? 1.0 : (u < -1.0 ? -1.0 : u); }

@@ -295,6 +295,19 @@ TEST(Bridge, ScalesWithTheBatteryAndIgnoresImplausibleReadings) {
   EXPECT_EQ(bridge.supply_V(std::nan(""), true), 8.0);
 }
 
+TEST(Bridge, GivesBackWhatItsOutputsLose) {
+  MotorParameters motor;
+  const Bridge exact(motor);
+  motor.bridge_lost_s = 3e-6;  // 0.06 of 50 us
+  const Bridge bridge(motor);
+  for (const double u : {-0.5, -0.01, 0.02, 0.3}) {
+    const double lost = std::copysign(0.06, u);
+    EXPECT_DOUBLE_EQ(bridge.invert(u, 0.0, 8.0), exact.invert(u, 0.0, 8.0) + lost) << u;
+  }
+  EXPECT_EQ(bridge.invert(0.0, 0.0, 8.0), 0.0);
+  EXPECT_EQ(bridge.invert(0.999, 0.0, 8.0), 1.0);
+}
+
 TEST(Bridge, DriveCoastGivesTheLinearMotorsCurrent) {
   const MotorParameters motor;
   const Bridge bridge(motor);
