@@ -193,10 +193,11 @@ def knobs_of(peer: Peer, kind: str) -> dict[str, tuple[float, float]]:
     return peer.knobs
 
 
-# The firmware's own filters that cannot name a lying encoder shake each wheel after arming: no peer's idea.
+# The firmware's own filters that cannot name a lying encoder shake each wheel after arming: no peer's idea. Nor is
+# what it gives back to the bridges: peers were published and searched for without.
 # The estimator that runs beside a peer's and is heard by nobody is the cheapest.
 BESIDE = {"mbbr": ("truth", "thesis"), "mip": ("truth", "lqr")}
-NO_SHAKE = "safety.encoder_check_drive=0.0"
+ALONE = ["safety.encoder_check_drive=0.0", "motor.bridge_lost_s=0.0"]
 
 
 def choice(peer: Peer, kind: str, config: dict, factors: Factors) -> tuple[str, str, list[str]]:
@@ -204,8 +205,8 @@ def choice(peer: Peer, kind: str, config: dict, factors: Factors) -> tuple[str, 
     if peer.name in (OURS, SHIPPED):
         return "", "", tune.settings(config, tune.KNOBS[kind], factors) if factors else []
     if peer.make is not None:
-        return (*BESIDE[kind], [NO_SHAKE])
+        return (*BESIDE[kind], [*ALONE])
     if kind == "mip":  # its robot's library, on the IMU's own tilt: of [T]'s filters it lasts longest here
-        return "attitude", "slc", ["controller.slc.published=true", NO_SHAKE]
+        return "attitude", "slc", ["controller.slc.published=true", *ALONE]
     told = {**published.kf(), **published.gains("Table 6.3")}  # 6.4.6: outlasts its EKF
-    return "kf_attitude", "thesis", [*(f"{k}={v}" for k, v in told.items()), NO_SHAKE]
+    return "kf_attitude", "thesis", [*(f"{k}={v}" for k, v in told.items()), *ALONE]
