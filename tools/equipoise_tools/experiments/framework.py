@@ -250,28 +250,32 @@ def complaints(record: dict, data: Data) -> list[str]:
 def page(name: str, result: Result) -> str:
     lines = [f"# {result.title}", "", result.method, "", "```", result.command, "```", ""]
     lines += [f"![{picture}]({picture}.png)\n" for picture in result.pictures]
+    values = [v for v in result.values if v.runs]
+    setups = dict.fromkeys(str(row.ran) for row in [*result.findings, *values])
+    number_of = {setup: i for i, setup in enumerate(setups, 1)}
+    lines += ["What ran:", "", *(f"{i}. {setup}" for setup, i in number_of.items()), ""] if setups else []
     if result.findings:
         lines += ["## Findings", ""]
         lines += ["`whose`: [T]'s statement, or ours beside it. Only [T]'s count for the status.", ""]
         lines += [
-            "| of | statement | whose | what ran | measured | needs | holds |",
-            "|---|---|---|---|--:|---|---|",
+            "| of | statement | whose | ran | measured | needs | holds |",
+            "|---|---|---|--:|--:|---|---|",
         ]
         lines += [
-            f"| {f.target} | {f.text} | {f.claim} | {f.ran} | {number(f.measured)} | {limits(f)} | "
+            f"| {f.target} | {f.text} | {f.claim} | {number_of[str(f.ran)]} | {number(f.measured)} | {limits(f)} | "
             f"{'yes' if f.holds else '**no**'} |"
             for f in result.findings
         ]
-    if result.values:
+    if values:
         lines += ["", "## Values", ""]
         lines += ["Median and 5 to 95 % over the runs; ratio: median over [T]'s.", ""]
-        head = "| of | quantity | what ran | median | 5 to 95 % | runs | [T] | ratio | unit |"
-        lines += [head, "|---|---|---|--:|--:|--:|--:|--:|---|"]
+        head = "| of | quantity | ran | median | 5 to 95 % | runs | [T] | ratio | unit |"
+        lines += [head, "|---|---|--:|--:|--:|--:|--:|--:|---|"]
         lines += [
-            f"| {v.target} | {v.what} | {v.ran} | {number(v.median)} | "
+            f"| {v.target} | {v.what} | {number_of[str(v.ran)]} | {number(v.median)} | "
             f"{'–' if v.low is None else f'{number(v.low)} to {number(v.high)}'} | {v.runs} | "
             f"{number(v.published)} | {number(v.ratio)} | {v.unit} |"
-            for v in result.values
+            for v in values
         ]
     lines += ["", f"Why they differ: {result.differs}", "", f"Every run: [Parquet](data/{name}.parquet)", ""]
     return "\n".join(lines)
