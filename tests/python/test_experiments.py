@@ -74,7 +74,8 @@ def test_values_are_medians_with_intervals_beside_print():
 def test_page_says_what_ran_what_is_needed_and_why(tmp_path):
     framework.write("some", result(), tmp_path)
     page = (tmp_path / "some.md").read_text()
-    assert "| Table 6.1 | is small | [T] | ekf13_published, thesis as published, [T] Table 6.3, full | 2.5 | at most 0.5 | **no** |" in page  # fmt: skip # noqa: E501
+    assert "1. ekf13_published, thesis as published, [T] Table 6.3, full\n2. " in page
+    assert "| Table 6.1 | is small | [T] | 1 | 2.5 | at most 0.5 | **no** |" in page
     assert "1.15 to 8.95" in page
     assert "Why they differ: because." in page
 

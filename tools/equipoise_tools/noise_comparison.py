@@ -1,7 +1,8 @@
 """Noise of gyro and accelerometer: a real log beside simulated robots of its configuration's population.
 
-At rest, standing and rolling, as far as the log has it: per quantity the real value and the simulated range,
-and how well a linear discriminant tells windows of one second apart (area under its ROC curve, 0.5: not at all).
+At rest, standing and rolling, as far as the log has it: per quantity the real value and the simulated
+range, and how well a linear discriminant tells windows of one second apart (area under its ROC curve, 0.5:
+not at all).
 """
 
 from __future__ import annotations

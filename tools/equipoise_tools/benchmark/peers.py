@@ -193,8 +193,8 @@ def knobs_of(peer: Peer, kind: str) -> dict[str, tuple[float, float]]:
     return peer.knobs
 
 
-# The firmware's own filters that cannot name a lying encoder shake each wheel after arming: no peer's idea. Nor is
-# what it gives back to the bridges: peers were published and searched for without.
+# The firmware's own filters that cannot name a lying encoder shake each wheel after arming: no peer's idea.
+# Nor is what it gives back to the bridges: peers were published and searched for without.
 # The estimator that runs beside a peer's and is heard by nobody is the cheapest.
 BESIDE = {"mbbr": ("truth", "thesis"), "mip": ("truth", "lqr")}
 ALONE = ["safety.encoder_check_drive=0.0", "motor.bridge_lost_s=0.0"]

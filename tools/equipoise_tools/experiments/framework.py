@@ -262,8 +262,8 @@ def page(name: str, result: Result) -> str:
             "|---|---|---|--:|--:|---|---|",
         ]
         lines += [
-            f"| {f.target} | {f.text} | {f.claim} | {number_of[str(f.ran)]} | {number(f.measured)} | {limits(f)} | "
-            f"{'yes' if f.holds else '**no**'} |"
+            f"| {f.target} | {f.text} | {f.claim} | {number_of[str(f.ran)]} | {number(f.measured)} | "
+            f"{limits(f)} | {'yes' if f.holds else '**no**'} |"
             for f in result.findings
         ]
     if values:
