@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from equipoise_tools import campaign, campaign_page
+from equipoise_tools import as_built, campaign, campaign_page
 from equipoise_tools.campaign_statistics import (
     influences,
     quantile_interval,
@@ -227,3 +227,12 @@ def test_trials_refuse_what_they_do_not_know(root, tmp_path):
     done = trials(root, tmp_path, [{"robots": 2}])
     assert done.returncode == 2
     assert "robots" in done.stderr
+
+
+def test_campaigns_run_again_take_their_place_on_the_page_and_leave_the_others():
+    page = "\n".join(
+        ["# Old", "## A", "1", "### of A", "## B", "2", "## Filter and controller, step by step", "3"]
+    )
+    text = as_built.renewed(page, ["## B\nnew\n", "## C\nnew\n", as_built.STEPS_HEAD + "new\n"])
+    steps = "## Filter and controller, step by step\nnew\n"
+    assert text == as_built.HEAD + "## A\n1\n### of A\n## B\nnew\n## C\nnew\n" + steps

@@ -2,13 +2,14 @@
 
 Writes docs/reports/as-built.md and its pictures: who stays upright, by how much it errs, what makes it fall
 and the worst cases of each campaign of tools/campaign; and the same robots with one filter and controller
-after the other. The first campaign's errors are drawn.
+after the other. Parts of the page that no DIR is about stay. The first campaign's errors are drawn.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -162,6 +163,14 @@ def steps_part(found: list[tuple[str, list[dict]]], first: int) -> str:
     return STEPS_HEAD + robots + "\n".join(steps_table(found)) + picture
 
 
+def renewed(page: str, parts: list[str]) -> str:
+    """The page with these parts in place of those under the same headings, or after them."""
+    found = {part.split("\n", 1)[0]: part for part in re.split(r"^(?=## )", page, flags=re.MULTILINE)[1:]}
+    found |= {part.split("\n", 1)[0]: part for part in parts}
+    last = found.pop(STEPS_HEAD.strip(), "")
+    return HEAD + "".join(found.values()) + last
+
+
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m equipoise_tools.as_built", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -186,7 +195,8 @@ def main(words: list[str] | None = None) -> int:
         found = steps(range(given.first_robot, given.first_robot + given.robots))
         draw_steps(found, given.out)
         parts[0] += "![Errors of these robots](as_built_population.png)\n\n"
-        page.write_text(HEAD + "".join(parts) + steps_part(found, given.first_robot), encoding="utf-8")
+        before = page.read_text(encoding="utf-8") if page.exists() else ""
+        page.write_text(renewed(before, [*parts, steps_part(found, given.first_robot)]), encoding="utf-8")
     except (UserError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
