@@ -27,7 +27,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         prog="tools/cockpit",
         description="Shows a robot in the browser, on 127.0.0.1 only, and drives it: a simulated one that it "
         "starts, or one that is attached by --telemetry.",
-        epilog="Examples: tools/cockpit --robot edumip; tools/cockpit -- --robot 7 --fault count_jump@20; "
+        epilog="Examples: tools/cockpit --robot edumip; "
+        "tools/cockpit --arm -- --robot 7 --fault encoder_dead@20; "
         "tools/cockpit --telemetry 'udpm://239.255.76.67:7667?ttl=1' --key anna.key",
     )
     parser.add_argument(

@@ -24,9 +24,10 @@ export class Inputs {
   listen() {
     const typing = (event) => event.target.closest("input:not([type=range]):not([type=checkbox]), select, textarea");
     addEventListener("keydown", (event) => {
-      if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.code === "Space") { event.preventDefault(); this.halt(); }
-      else if (event.code === "Escape") this.disarm();
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.code === "Escape") this.disarm(); // wherever the focus is
+      else if (typing(event)) return;
+      else if (event.code === "Space") { event.preventDefault(); this.halt(); }
       else if (event.code in KEYS) {
         event.preventDefault();
         if (!event.repeat) this.pressed.add(event.code); // a stop is not undone by a key that is still down
