@@ -114,6 +114,7 @@ def test_bringup_writes_a_board_file_that_fits_and_run_reads_its_calibration(roo
         assert text in said
     assert said.count("  motor 3: ") == 2 and f"written to {board}" in said
     calibration = tmp_path / "robot-calibration.toml"
+    assert f"--board {board} --out {calibration} --backend stand" in said
     assert values(calibration, "bias_rad_s")
     # Whoever reads the board file reads the calibration beside it, strictly.
     ended = equipoise(root, "doctor", "--board", board, "--root", tmp_path)  # no robot here

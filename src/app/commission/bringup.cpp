@@ -91,11 +91,12 @@ int run_bringup(const BringupArguments& a) {
   }
   save_calibration(calibration, calibration_path);
   write_whole(text, a.out);
-  std::fprintf(a.json == "-" ? stderr : stdout,
-               "%s\nwritten to %s and %s\nnext: equipoise calibrate accel --config %s --board %s --out %s%s\n",
-               wrong.empty() ? "wired as the board file says" : ("corrected: " + wrong).c_str(),
-               a.out.c_str(), calibration_path.c_str(), a.commissioning.config.c_str(), a.out.c_str(),
-               calibration_path.c_str(), commissioning.on_stand() ? " --backend stand" : "");
+  std::fprintf(
+      a.json == "-" ? stderr : stdout,
+      "%s\nwritten to %s and %s\nnext: equipoise calibrate accel --config %s --board %s --out %s%s\n",
+      wrong.empty() ? "wired as the board file says" : ("corrected: " + wrong).c_str(), a.out.c_str(),
+      calibration_path.c_str(), a.commissioning.config.c_str(), a.out.c_str(), calibration_path.c_str(),
+      commissioning.on_stand() ? " --backend stand" : "");
   if (!a.json.empty())
     write_json({{"board", a.out}, {"calibration", calibration_path}, {"corrected", wrong}}, a.json);
   return 0;
