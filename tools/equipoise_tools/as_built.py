@@ -30,6 +30,7 @@ from .campaign_page import (
     worst_cases,
 )
 from .campaign_statistics import survival_over_time
+from .experiments.runs import LOSSLESS
 from .parameters import ROBOTS
 from .paths import UserError, repository_root
 from .style import plt
@@ -56,7 +57,7 @@ def steps(robots: range) -> list[tuple[str, list[dict]]]:
         common = {"seed": 1, "yaw_hz": POINT[0], "drive_mps": POINT[1], "duration_s": DURATION_S}
         choice = {"fidelity": WORLD, "estimator": estimator, "controller": controller}
         asked = [{"robot": robot, **common, **choice} for robot in robots]
-        found.append((name, run_trials("config/mbbr.toml", asked)))
+        found.append((name, run_trials("config/mbbr.toml", asked, LOSSLESS)))
     return found
 
 

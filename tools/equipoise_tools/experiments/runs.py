@@ -26,8 +26,8 @@ NO_GATES = {
     "safety.max_innovation": 1000,
     "safety.encoder_check_drive": 0,
     "safety.encoder_probe_drive": 0,
-    "motor.bridge_lost_s": 0,  # nor do these worlds' bridges lose what the MBBR's give back
 }
+LOSSLESS = {"motor.bridge_lost_s": 0}  # the bridges of built2025 lose nothing
 AS_PUBLISHED = published.control()
 # [T] computes in double precision: no difference to it comes from rounding.
 PRECISION = {"estimator.ekf.precision": "double"}
@@ -60,7 +60,8 @@ def _sim(log: Path | str, config: str, sets: dict[str, object] | None, options: 
     for key, value in options.items():
         flag = "--" + key.replace("_", "-")
         arguments += [flag] if value is True else [flag, value]
-    for key, value in {**PRECISION, **(sets or {})}.items():
+    bridges = LOSSLESS if options.get("fidelity") == BUILT else {}
+    for key, value in {**PRECISION, **bridges, **(sets or {})}.items():
         arguments += ["--set", f"{key}={value}"]
     return json.loads(equipoise(*arguments, fails=True))
 
