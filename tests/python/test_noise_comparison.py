@@ -39,19 +39,32 @@ def test_a_robot_unlike_the_others_is_told_from_its_own_population():
     assert noise_comparison.own_auc(alike[:1], 9) is None
 
 
-def test_real_noise_lies_within_a_factor_of_the_population(root):
-    log = root.parent / "shared/real/pichim+Mini_Segway/docs/matlab/LOG278.TXT"
+REAL = {
+    "mini_segway_log278": "pichim+Mini_Segway/docs/matlab/LOG278.TXT",
+    "regbot_bal_log_2": "SebastianBitsch+robobot-project/regbot/matlab/mekanisk/b1/bal_log_2.txt",
+}
+
+
+@pytest.mark.parametrize("name", noise_comparison.MOTIONS)
+def test_real_noise_lies_within_a_factor_of_the_population(root, name):
+    log = root.parent / "shared/real" / REAL[name]
     if not log.exists():
         pytest.skip("../shared/real is not there: real logs are not part of the project")
-    binary = root / "build/host/equipoise"
+    binary, maps = root / "build/host/equipoise", root / "config/real/maps"
     made = [
-        noise_comparison.simulated_motions(binary, root / "config/edumip.toml", robot)
+        noise_comparison.simulated_motions(binary, noise_comparison.robot_of(maps / f"{name}.toml"), robot)
         for robot in (1, 2, 3, 4)
     ]
-    real = noise_comparison.real_motions(binary, log, root / "config/real/maps/mini_segway_log278.toml")
-    result = noise_comparison.compare(real, made)
-    # The chip at rest and the robot standing: a gross error of unit, frame or shape is a factor of ten.
-    for motion in ("rest", "standing"):
+    result = noise_comparison.compare(noise_comparison.real_motions(binary, log, maps / f"{name}.toml"), made)
+    # A gross error of unit, frame or shape is a factor of ten.
+    assert "standing" in result
+    for motion in result.keys() - {"rolling"}:
         for axis, row in result[motion]["quantities"].items():
             assert row["outside_by"] < 5.0, (motion, axis, row)
     assert 0.5 <= result["standing"]["auc"] <= 1.0
+
+
+def test_a_map_whose_motions_are_not_known_is_refused(root, tmp_path):
+    other = tmp_path / "other.toml"
+    with pytest.raises(noise_comparison.UserError, match="known: mini_segway_log278"):
+        noise_comparison.real_motions(root / "build/host/equipoise", tmp_path / "log.csv", other)

@@ -45,10 +45,15 @@ def imu(log: Path, calibration: dict[str, Any]) -> np.ndarray:
     return np.hstack([gyro @ turned, accel @ turned])
 
 
+def robot_of(map_file: Path) -> Path:
+    """Its robot's configuration."""
+    return map_file.parent / tomllib.loads(map_file.read_text())["robot"]
+
+
 def real_motions(program: Path, table: Path, map_file: Path) -> dict[str, np.ndarray]:
     if map_file.stem not in MOTIONS:
         raise UserError(f"{map_file}: its motions are not known; known: {', '.join(MOTIONS)}")
-    calibration = configuration(map_file.parent / tomllib.loads(map_file.read_text())["robot"])["calibration"]
+    calibration = configuration(robot_of(map_file))["calibration"]
     with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
         log = Path(folder) / "real.lcm"
         call = [str(program), "import", str(table), "--map", str(map_file), "-o", str(log), "--json", "-"]
@@ -219,7 +224,7 @@ def main(words: list[str] | None = None) -> int:
     program = binary()
     robots = range(1, given.robots + 1)
     real = real_motions(program, given.log, given.map)
-    config = given.map.parent / tomllib.loads(given.map.read_text())["robot"]
+    config = robot_of(given.map)
     made = [simulated_motions(program, config, robot, given.set) for robot in robots]
     result = compare(real, made)
     if given.json:
