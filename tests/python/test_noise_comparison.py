@@ -50,12 +50,10 @@ def test_real_noise_lies_within_a_factor_of_the_population(root, name):
     log = root.parent / "shared/real" / REAL[name]
     if not log.exists():
         pytest.skip("../shared/real is not there: real logs are not part of the project")
-    binary, maps = root / "build/host/equipoise", root / "config/real/maps"
-    made = [
-        noise_comparison.simulated_motions(binary, noise_comparison.robot_of(maps / f"{name}.toml"), robot)
-        for robot in (1, 2, 3, 4)
-    ]
-    result = noise_comparison.compare(noise_comparison.real_motions(binary, log, maps / f"{name}.toml"), made)
+    binary = root / "build/host/equipoise"
+    config, real = noise_comparison.real_motions(binary, log, root / f"config/real/maps/{name}.toml")
+    made = [noise_comparison.simulated_motions(binary, config, robot) for robot in (1, 2, 3, 4)]
+    result = noise_comparison.compare(real, made)
     # A gross error of unit, frame or shape is a factor of ten.
     assert "standing" in result
     for motion in result.keys() - {"rolling"}:

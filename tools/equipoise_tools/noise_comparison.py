@@ -12,7 +12,6 @@ import json
 import subprocess
 import sys
 import tempfile
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -45,24 +44,20 @@ def imu(log: Path, calibration: dict[str, Any]) -> np.ndarray:
     return np.hstack([gyro @ turned, accel @ turned])
 
 
-def robot_of(map_file: Path) -> Path:
-    """Its robot's configuration."""
-    return map_file.parent / tomllib.loads(map_file.read_text())["robot"]
-
-
-def real_motions(program: Path, table: Path, map_file: Path) -> dict[str, np.ndarray]:
+def real_motions(program: Path, table: Path, map_file: Path) -> tuple[Path, dict[str, np.ndarray]]:
+    """The robot's configuration, and its motions."""
     if map_file.stem not in MOTIONS:
         raise UserError(f"{map_file}: its motions are not known; known: {', '.join(MOTIONS)}")
-    calibration = configuration(robot_of(map_file))["calibration"]
     with tempfile.TemporaryDirectory(prefix="equipoise-") as folder:
         log = Path(folder) / "real.lcm"
         call = [str(program), "import", str(table), "--map", str(map_file), "-o", str(log), "--json", "-"]
         done = subprocess.run(call, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise UserError(done.stderr.strip())
-        samples = imu(log, calibration)
+        config = Path(json.loads(done.stdout)["config"])
+        samples = imu(log, configuration(config)["calibration"])
     times = MOTIONS[map_file.stem]
-    return {name: samples[int(HZ * begin) : int(HZ * end)] for name, (begin, end) in times.items()}
+    return config, {name: samples[int(HZ * begin) : int(HZ * end)] for name, (begin, end) in times.items()}
 
 
 def simulated(program: Path, config: Path, robot: int, settings: list[str], words: str) -> np.ndarray:
@@ -223,8 +218,7 @@ def main(words: list[str] | None = None) -> int:
         parser.error(f"{given.log}: cannot be opened")
     program = binary()
     robots = range(1, given.robots + 1)
-    real = real_motions(program, given.log, given.map)
-    config = robot_of(given.map)
+    config, real = real_motions(program, given.log, given.map)
     made = [simulated_motions(program, config, robot, given.set) for robot in robots]
     result = compare(real, made)
     if given.json:

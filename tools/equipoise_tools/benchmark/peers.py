@@ -197,7 +197,7 @@ def knobs_of(peer: Peer, kind: str) -> dict[str, tuple[float, float]]:
 # Nor is what it gives back to the bridges: peers were published and searched for without.
 # The estimator that runs beside a peer's and is heard by nobody is the cheapest.
 BESIDE = {"mbbr": ("truth", "thesis"), "mip": ("truth", "lqr")}
-ALONE = ["safety.encoder_check_drive=0.0", "motor.bridge_lost_s=0.0"]
+ALONE = "safety.encoder_check_drive=0.0", "motor.bridge_lost_s=0.0"
 
 
 def choice(peer: Peer, kind: str, config: dict, factors: Factors) -> tuple[str, str, list[str]]:
