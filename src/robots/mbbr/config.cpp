@@ -105,8 +105,6 @@ MbbrEkf::Params read_ekf(Section s) {
   p.disturbance_time_constant_s = s.number("disturbance_time_constant_s", kTickS, 1e6);
   p.precision = config::read_precision(s);
   p.push_nis = s.number("push_nis", 1.0, 1e9);
-  p.push_tilt_rate_variance = s.number("push_tilt_rate_variance", 0.0, 100.0);
-  p.push_ball_rate_variance = s.number("push_ball_rate_variance", 0.0, 1000.0);
   s.finish();
   return p;
 }

@@ -139,6 +139,7 @@ generated::MbbrFilter::Constants<double> MbbrEkfModel::constants() const noexcep
 MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
     : params_(params),
       kinematics_(robot),
+      mass_kg_(robot.m_t),
       filter_(Model(robot, params.disturbance_time_constant_s), params.filter, params.precision),
       time_(params.sensor_age_s) {
   const auto rates = [c = mbbr_coefficients(robot)](double lean_rad, double u) {
@@ -148,6 +149,15 @@ MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
   };
   per_push_ = push_response({robot.m_t, robot.l, robot.r, robot.k1}, rates);
   start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
+}
+
+/// A wheel that slips makes the motors' torque less than told: the accelerometer feels that, too, but it is no
+/// push, and rates that it widens would follow the wheel.
+double MbbrEkf::felt_push_N() const noexcept {
+  const auto& nis = filter_.row_nis();
+  if (slipped_ || !(0.5 * (nis[Model::kAccel] + nis[Model::kAccel + 1]) > params_.push_nis)) return 0.0;
+  const auto& felt = filter_.row_innovation();
+  return mass_kg_ * std::hypot(felt[Model::kAccel], felt[Model::kAccel + 1]);
 }
 
 void MbbrEkf::allow_push(double sigma_N) noexcept {
@@ -190,13 +200,9 @@ void MbbrEkf::predict(const Vec3& u) noexcept {
   // [T] (6.3)-(6.4), over the tick that the filter leaves behind, by the mean of the rates at its ends.
   const Vec2 before = x().segment<2>(Model::kPhiDotX);
   const double rate_before = x()(Model::kThetaDotZ);
-  const auto& nis = filter_.row_nis();
-  const bool pushed = 0.5 * (nis[Model::kAccel] + nis[Model::kAccel + 1]) > params_.push_nis;
+  const double push_N = felt_push_N();
   filter_.predict(time_.acted());
-  if (pushed) {
-    filter_.widen(Model::kThetaDotX, 2, params_.push_tilt_rate_variance);
-    filter_.widen(Model::kPhiDotX, 2, params_.push_ball_rate_variance);
-  }
+  if (push_N > 0.0) allow_push(push_N);
   const double turn = 0.5 * kTickS * (rate_before + x()(Model::kThetaDotZ));
   const Vec2 mean = 0.5 * (before + x().segment<2>(Model::kPhiDotX));
   phi_ += kTickS * (direction_ * Turn::small(0.5 * turn))(mean);

@@ -72,9 +72,7 @@ class MbbrEkf {
     double disturbance_time_constant_s = 1.0;
     double sensor_age_s = 0.0;  // of the IMU's samples against the encoders'
     Precision precision = Precision::kDouble;
-    double push_nis = 24.0;  // the accelerometer feels a push; beyond it the rates are in doubt by
-    double push_tilt_rate_variance = 0.02;
-    double push_ball_rate_variance = 0.5;
+    double push_nis = 24.0;  // of the accelerometer, beyond which the robot is pushed
   };
 
   MbbrEkf(const MbbrParameters& robot, const Params& params);
@@ -136,10 +134,13 @@ class MbbrEkf {
   }
 
  private:
+  /// In the last update, by the accelerometer; 0: none.
+  double felt_push_N() const noexcept;
   void miss(const Mbbr::Sample& z) noexcept;
 
   Params params_;
   MbbrKinematics kinematics_;
+  double mass_kg_;
   Filter filter_;
   Vec2 per_push_;  // change of tilt and ball rate in a tick, per N
   TimeBase<3, 3> time_;

@@ -1,5 +1,7 @@
 #include "robots/mbbr/estimators.hpp"
 
+#include <limits>
+
 namespace equipoise {
 namespace {
 
@@ -26,12 +28,18 @@ SensorFaultsParams sensor_faults(const MbbrEstimatorParams& params) {
   return p;
 }
 
+/// A push is one of the detector's hypotheses: no filter of it assumes one by itself.
+MbbrEkf::Params evidence(MbbrEkf::Params p) noexcept {
+  p.push_nis = std::numeric_limits<double>::infinity();
+  return p;
+}
+
 double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * kPi); }
 
 }  // namespace
 
 MbbrEstimators::MbbrEstimators(const Params& params)
-    : FaultTolerant(params, sensor_faults(params), params.ekf),
+    : FaultTolerant(params, sensor_faults(params), evidence(params.ekf)),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()

@@ -17,7 +17,7 @@ RATES = slice(5, 8)
 
 
 class Extended:
-    """As the firmware's default filter; the rows at once in place of one after the other."""
+    """As the firmware's default filter, without its pushes and slips; the rows at once in place of one after the other."""
 
     name: ClassVar[str] = "extended"
     errors: ClassVar[int] = N
@@ -35,21 +35,11 @@ class Extended:
         rate = self.x[TURN].copy()
         self._propagate(u)
         self.P = 0.5 * (self.P + self.P.transpose(0, 2, 1))  # an asymmetry grows with the unstable robot
-        self._widen()
         self.heading_rad = self.heading_rad + 0.5 * DT * (rate + self.x[TURN])
 
     def _propagate(self, u: np.ndarray) -> None:
         self.x, F = self.model.predict(self.x, u)
         self.P = F @ self.P @ F.transpose(0, 2, 1) + self.model.Q
-
-    def _widen(self) -> None:
-        """After a push the rates are in doubt."""
-        robot = self.model.robot
-        pushed = (np.square(self.nu[GROUPS["accelerometer"]]).mean(axis=0) > robot.push_nis).astype(float)
-        for i in (5, 6):
-            self.P[:, i, i] += pushed * robot.push_tilt_rate_variance
-        for i in (8, 9):
-            self.P[:, i, i] += pushed * robot.push_ball_rate_variance
 
     def update(self, u: np.ndarray, y: np.ndarray, use: np.ndarray) -> None:
         """use: which rows count."""

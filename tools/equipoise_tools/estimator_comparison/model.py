@@ -37,9 +37,6 @@ class Robot:
     r: np.ndarray
     input_variance: np.ndarray
     initial_variance: np.ndarray
-    push_nis: float
-    push_tilt_rate_variance: float
-    push_ball_rate_variance: float
 
     def value(self, name: str) -> float:
         return dict(self.parameters)[name]
@@ -88,9 +85,6 @@ def robot_of(config: dict, fidelity: str = "full", **changed: float) -> Robot:
         r=np.array(e["r"]),
         input_variance=np.array(e["input_variance"]),
         initial_variance=np.square(e["initial_sigma"]),
-        push_nis=e["push_nis"],
-        push_tilt_rate_variance=e["push_tilt_rate_variance"],
-        push_ball_rate_variance=e["push_ball_rate_variance"],
     )
 
 
