@@ -160,12 +160,13 @@ TEST(MbbrEkf, OnlyTheAccelerometerFeelsAPush) {
   const Turning robot;
   const MbbrEkf settled = robot.after(5.0);
   // Of the ball's rates, a tick after samples that are off by so much.
-  const auto doubt = [&](const Vec3& gyro_rad_s, const Vec3& accel_m_s2) {
+  const auto doubt = [&](const Vec3& gyro_rad_s, const Vec3& accel_m_s2, double wheel_rad = 0.0) {
     MbbrEkf filter = settled;
     filter.predict(robot.input());
     Mbbr::Sample z = robot.at(5.005);
     z.gyro_B_rad_s += gyro_rad_s;
     z.accel_B_m_s2 += accel_m_s2;
+    z.wheel_angle_rad.x() += wheel_rad;
     filter.update(z);
     filter.predict(robot.input());
     return filter.P()(Model::kPhiDotX, Model::kPhiDotX);
@@ -175,6 +176,9 @@ TEST(MbbrEkf, OnlyTheAccelerometerFeelsAPush) {
   EXPECT_NEAR(doubt({1.5, 0.0, 0.0}, Vec3::Zero()), usual, 0.01 * usual);  // it shakes
   EXPECT_NEAR(doubt(Vec3::Zero(), {3.0, 0.0, 0.0}), usual, 0.01 * usual);  // and rolls over a joint
   EXPECT_GT(doubt(Vec3::Zero(), {12.0, 0.0, 0.0}), usual + 0.4);
+  EXPECT_GT(doubt(Vec3::Zero(), {24.0, 0.0, 0.0}), usual + 4.0 * 0.4);  // twice the force
+  const double slipping = doubt(Vec3::Zero(), Vec3::Zero(), 0.5);
+  EXPECT_NEAR(doubt(Vec3::Zero(), {12.0, 0.0, 0.0}, 0.5), slipping, 0.01 * slipping);
 }
 
 TEST(MbbrEkf, SurprisingRowHasALargeInnovation) {
