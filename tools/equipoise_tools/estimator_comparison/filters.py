@@ -10,14 +10,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from .model import AT, DT, GROUPS, MOTION, PHI, ROWS, SCALE, Model, N, U
+from .model import AT, DT, MOTION, PHI, ROWS, SCALE, Model, N, U
 
 TURN = AT["dtz"]
 RATES = slice(5, 8)
 
 
 class Extended:
-    """As the firmware's default filter, without its pushes and slips; the rows at once in place of one after the other."""
+    """As the firmware's default filter without pushes and slips; the rows at once, not one after the other."""
 
     name: ClassVar[str] = "extended"
     errors: ClassVar[int] = N
