@@ -17,7 +17,7 @@ RATES = slice(5, 8)
 
 
 class Extended:
-    """As the firmware's default filter without pushes and slips; the rows at once, not one after the other."""
+    """As the firmware's default filter without pushes and slips; all rows at once."""
 
     name: ClassVar[str] = "extended"
     errors: ClassVar[int] = N
