@@ -151,8 +151,8 @@ MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
   start(Vec2::Zero(), Vec3::Zero(), Vec3::Zero());
 }
 
-/// A wheel that slips makes the motors' torque less than told: the accelerometer feels that, too, but it is no
-/// push, and rates that it widens would follow the wheel.
+/// A wheel that slips makes the motors' torque less than told: the accelerometer feels that, too, but it is
+/// no push, and rates that it widens would follow the wheel.
 double MbbrEkf::felt_push_N() const noexcept {
   const auto& nis = filter_.row_nis();
   if (slipped_ || !(0.5 * (nis[Model::kAccel] + nis[Model::kAccel + 1]) > params_.push_nis)) return 0.0;
