@@ -2,12 +2,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "app/text/errors.hpp"
 #include "equipoise/actuate/safety.hpp"
@@ -19,10 +23,18 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
+/// Of this process alone: tests run side by side.
 std::string file_of(const std::string& name, const std::string& content) {
-  const std::string path = ::testing::TempDir() + name;
-  std::ofstream(path, std::ios::binary) << content;
-  return path;
+  struct Files {
+    std::vector<std::string> paths;
+    ~Files() {
+      for (const std::string& path : paths) std::remove(path.c_str());
+    }
+  };
+  static Files files;
+  files.paths.push_back(::testing::TempDir() + std::to_string(::getpid()) + "_" + name);
+  std::ofstream(files.paths.back(), std::ios::binary) << content;
+  return files.paths.back();
 }
 
 std::string refusal(const std::string& path, const TableShape& shape = {}) {
