@@ -2,40 +2,22 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <string>
-#include <vector>
 
 #include "app/text/errors.hpp"
 #include "equipoise/actuate/safety.hpp"
 #include "support/foreign_table.hpp"
+#include "support/own_file.hpp"
 
 namespace equipoise::app {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-/// Of this process alone: tests run side by side.
-std::string file_of(const std::string& name, const std::string& content) {
-  struct Files {
-    std::vector<std::string> paths;
-    ~Files() {
-      for (const std::string& path : paths) std::remove(path.c_str());
-    }
-  };
-  static Files files;
-  files.paths.push_back(::testing::TempDir() + std::to_string(::getpid()) + "_" + name);
-  std::ofstream(files.paths.back(), std::ios::binary) << content;
-  return files.paths.back();
-}
 
 std::string refusal(const std::string& path, const TableShape& shape = {}) {
   try {
@@ -47,7 +29,7 @@ std::string refusal(const std::string& path, const TableShape& shape = {}) {
 }
 
 TEST(Table, ReadsCsvWithNamesBlanksAndEmptyCells) {
-  const Table t = read_table(file_of("a.csv", "t, \"u\",w\n0.0,1e-3,\n0.5,-2,+3\r\n"), {});
+  const Table t = read_table(own_file("a.csv", "t, \"u\",w\n0.0,1e-3,\n0.5,-2,+3\r\n"), {});
   EXPECT_THAT(t.names, ElementsAre("t", "u", "w"));
   EXPECT_THAT(t.columns[1], ElementsAre(1e-3, -2.0));
   EXPECT_TRUE(std::isnan(t.columns[2][0]));
@@ -56,7 +38,7 @@ TEST(Table, ReadsCsvWithNamesBlanksAndEmptyCells) {
 
 TEST(Table, ReadsColumnsByBlanksAfterCommentsAndCountsTornRows) {
   const Table t =
-      read_table(file_of("b.txt", "% head\n%% more\n 1  2\n3 4 \n5\n6 7\n"), {{"a", "b"}, false, 0});
+      read_table(own_file("b.txt", "% head\n%% more\n 1  2\n3 4 \n5\n6 7\n"), {{"a", "b"}, false, 0});
   EXPECT_THAT(t.columns[1], ElementsAre(2.0, 4.0, 7.0));
   EXPECT_EQ(t.torn_rows, 1U);
 }
@@ -65,25 +47,25 @@ TEST(Table, ReadsFloat32RowsBehindAHeader) {
   const float values[5] = {1.5F, -2.0F, 3.25F, 4.0F, 9.0F};  // the last row is torn
   std::string bytes(3, 'x');
   bytes.append(reinterpret_cast<const char*>(values), sizeof values);
-  const Table t = read_table(file_of("c.bin", bytes), {{"a", "b"}, true, 3});
+  const Table t = read_table(own_file("c.bin", bytes), {{"a", "b"}, true, 3});
   EXPECT_THAT(t.columns[0], ElementsAre(1.5, 3.25));
   EXPECT_THAT(t.columns[1], ElementsAre(-2.0, 4.0));
   EXPECT_EQ(t.torn_rows, 1U);
 }
 
 TEST(Table, TakesWhatSpreadsheetsWriteAroundATable) {
-  const Table t = read_table(file_of("s.csv", "\xEF\xBB\xBF\"\"\n\"t\",\"u\"\n\"\"\n1,2\n\"\n"), {});
+  const Table t = read_table(own_file("s.csv", "\xEF\xBB\xBF\"\"\n\"t\",\"u\"\n\"\"\n1,2\n\"\n"), {});
   EXPECT_THAT(t.names, ElementsAre("t", "u"));
   EXPECT_THAT(t.columns[1], ElementsAre(2.0));
 }
 
 TEST(Table, NamesWhatItCannotRead) {
-  EXPECT_THAT(refusal(file_of("d.csv", "a,b\n1,2\n3,four\n")),
+  EXPECT_THAT(refusal(own_file("d.csv", "a,b\n1,2\n3,four\n")),
               HasSubstr("d.csv:3: b: \"four\" is not a number"));
-  EXPECT_THAT(refusal(file_of("e.csv", "1,2\n3,4\n")), HasSubstr("table.columns"));
-  EXPECT_THAT(refusal(file_of("f.txt", "1 2\n3 4\n"), {{"a", "b", "c"}, false, 0}), HasSubstr("2 cells"));
-  EXPECT_THAT(refusal(file_of("g.mat", "MATLAB 5.0")), HasSubstr("./tools/table"));
-  EXPECT_THAT(refusal(file_of("h.bin", std::string("\0\0\0\0", 4))), HasSubstr("float32"));
+  EXPECT_THAT(refusal(own_file("e.csv", "1,2\n3,4\n")), HasSubstr("table.columns"));
+  EXPECT_THAT(refusal(own_file("f.txt", "1 2\n3 4\n"), {{"a", "b", "c"}, false, 0}), HasSubstr("2 cells"));
+  EXPECT_THAT(refusal(own_file("g.mat", "MATLAB 5.0")), HasSubstr("./tools/table"));
+  EXPECT_THAT(refusal(own_file("h.bin", std::string("\0\0\0\0", 4))), HasSubstr("float32"));
 }
 
 /// Parts of a map, of which a test replaces one.
@@ -98,7 +80,7 @@ ImportMap map_of(std::map<std::string, std::string> parts) {
   std::string text = parts["robot"];
   for (const auto& [name, part] : parts)
     if (name != "robot") text += part;
-  return read_import_map(file_of("map.toml", text));
+  return read_import_map(own_file("map.toml", text));
 }
 std::string map_refusal(const std::string& part, const std::string& text) {
   try {
