@@ -30,12 +30,10 @@ std::optional<LiveRequest> live_request(const std::string& line) {
     double yaw_hz = 0.0;
     words >> motion.velocity_W_m_s[0] >> motion.velocity_W_m_s[1] >> yaw_hz;
     motion.yaw_rate_rad_s = 2.0 * kPi * yaw_hz;
-    const bool numbers = !words.fail() && std::isfinite(motion.velocity_W_m_s[0]) &&
-                         std::isfinite(motion.velocity_W_m_s[1]) && std::isfinite(yaw_hz);
     // The command line's ranges.
     const bool in_range = std::abs(motion.velocity_W_m_s[0]) <= 2.0 &&
                           std::abs(motion.velocity_W_m_s[1]) <= 2.0 && std::abs(yaw_hz) <= 5.0;
-    if (!numbers || !in_range) return std::nullopt;
+    if (words.fail() || !in_range) return std::nullopt;
     request.action = signed_command_t::DRIVE;
   } else if (what == "arm") {
     request.action = signed_command_t::ARM;
