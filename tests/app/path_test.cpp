@@ -39,6 +39,7 @@ TEST_P(NamedPath, BeginsAtRestAlongXAndNeverExceedsItsSpeed) {
   const auto path = make_path(GetParam(), kSpeed_m_s, kAnything);
   EXPECT_EQ(path->at(0.0).velocity_W_m_s.norm(), 0.0);
   EXPECT_EQ(path->at(0.0).position_W_m.norm(), 0.0);
+  EXPECT_EQ(path->at(0.0).yaw_rad, 0.0);
   const Vec2 soon = path->at(0.1).velocity_W_m_s.normalized();
   EXPECT_NEAR(soon.x(), 1.0, 1e-3);
   double fastest = 0.0;
@@ -156,7 +157,11 @@ TEST(WaypointPath, RefusesWhatIsWrong) {
   const auto refused = [](const char* text) { return refusal(waypoint_file(text), kAnything); };
   EXPECT_NE(refused("0 0 0 0\n1 2 3\n").find(":2: expected four numbers"), std::string::npos);
   EXPECT_NE(refused("0 0 0 0\n1 2 3 4 5\n").find(":2: expected four numbers"), std::string::npos);
-  EXPECT_NE(refused("0 0 0 0\n1 nan 0 0\n").find(":2: "), std::string::npos);
+  for (const char* value : {"nan", "inf", "1e999"})
+    EXPECT_NE(
+        refused((std::string("0 0 0 0\n1 0 0 ") + value + "\n").c_str()).find(":2: expected four numbers"),
+        std::string::npos)
+        << value;
   EXPECT_NE(refused("0.1 0 0 0\n1 0 0 0\n").find(":1: the first waypoint"), std::string::npos);
   EXPECT_NE(refused("0 0 0 0\n1 0 0 0\n1 0 0 0\n").find(":3: times must increase"), std::string::npos);
   EXPECT_NE(refused("0 0 0 0\n").find("two waypoints"), std::string::npos);
@@ -223,6 +228,33 @@ TEST(WaypointPath, ARobotThatGoesAlongItsNoseRefusesCusps) {
   }
   EXPECT_EQ(refusal(waypoint_file("0 0 0 0\n4 -0.4 0 0\n"), nose), "") << "it begins along the path";
   for (const char* name : {"circle", "figure8", "square"}) EXPECT_EQ(refusal(name, nose), "");
+}
+
+/// A metre in 4 s, a stop without any acceleration, and a metre another way: the spline's own pieces.
+TEST(WaypointPath, ARobotThatGoesAlongItsNoseTurnsUpTo45DegreesWhereItStops) {
+  PathLimits nose = kAnything;
+  nose.along_nose = true;
+  const auto told = [&](double degrees) {
+    const double x = std::cos(degrees * kPi / 180.0);
+    const double y = std::sin(degrees * kPi / 180.0);
+    std::string text = "0 0 0 0\n2 0.75 0 0\n4 1 0 0\n";
+    for (const auto& [t, way] : {std::pair(6.0, 0.25), std::pair(8.0, 1.0)}) {
+      char line[120];
+      std::snprintf(line, sizeof line, "%g %.17g %.17g 0\n", t, 1.0 + way * x, way * y);
+      text += line;
+    }
+    return refusal(waypoint_file(text), nose);
+  };
+  for (const double degrees : {44.0, -44.0}) EXPECT_EQ(told(degrees), "") << degrees;
+  for (const double degrees : {46.0, -46.0, 170.0})
+    EXPECT_NE(told(degrees).find("rad of turn on the spot at 4"), std::string::npos) << degrees;
+}
+
+TEST(WaypointPath, ItsLastTickIsCheckedToo) {
+  const std::string brakes_late = waypoint_file("0 0 0 0\n4 0.5 0 0\n4.5 1 0 0\n");
+  const double last = make_path(brakes_late, kSpeed_m_s, kAnything)->at(4.495).velocity_W_m_s.norm() / kTickS;
+  EXPECT_EQ(refusal(brakes_late, {10.0, 1.0001 * last, 10.0}), "");
+  EXPECT_NE(refusal(brakes_late, {10.0, 0.9999 * last, 10.0}).find("m/s^2 at 4.5 s"), std::string::npos);
 }
 
 }  // namespace
