@@ -1,17 +1,12 @@
 // The lines of `equipoise send --live`, and what a robot at the other end of a serial line makes of them.
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <pthread.h>
 #include <pty.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <csignal>
-#include <exception>
-#include <memory>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -19,8 +14,8 @@
 
 #include "app/run/conversation.hpp"
 #include "app/text/json.hpp"
-#include "equipoise/runtime/command_receiver.hpp"
 #include "equipoise/types.hpp"
+#include "support/live_relay.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -53,140 +48,6 @@ TEST(LiveRequest, TheRangesBelongToIt) {
   for (const char* line : {"drive -2.1 0 0", "drive 0 2.1 0", "drive 0 0 -5.1", "drive 0 inf 0", "take it"})
     EXPECT_FALSE(live_request(line)) << line;
 }
-
-using runtime::CommandKey;
-using runtime::CommandKeys;
-using runtime::CommandReceiver;
-
-/// The robot's end: a pseudo-terminal, however fast the other end believes it to be.
-class Terminal final : public runtime::ByteStream {
- public:
-  explicit Terminal(int fd) : fd_(fd) { fcntl(fd_, F_SETFL, O_NONBLOCK); }
-  std::size_t read(std::uint8_t* out, std::size_t size) override { return some(::read(fd_, out, size)); }
-  std::size_t write(const std::uint8_t* data, std::size_t size) override {
-    return some(::write(fd_, data, size));
-  }
-  double bytes_per_s() const override { return 11520.0; }
-
- private:
-  static std::size_t some(ssize_t n) { return n > 0 ? static_cast<std::size_t>(n) : 0; }
-  int fd_;
-};
-
-class Relay : public ::testing::Test {
- protected:
-  static constexpr double kPatience_s = 20.0;  // of this test with a busy machine
-
-  void SetUp() override {
-    char name[64] = {};
-    ASSERT_EQ(openpty(&robots_, &holders_, name, nullptr, nullptr), 0);
-    ASSERT_EQ(pipe(requests_), 0);
-    device_ = name;
-  }
-  void TearDown() override {
-    end();
-    robot_.reset();
-    for (const int fd : {robots_, holders_, requests_[0]}) close(fd);
-  }
-
-  /// Returns when a robot has been found. `requests`: from which lines come.
-  void start(int baud, int requests, double patience_s = kPatience_s) {
-    const CommandKeys keys = CommandKeys::of_robot("mbbr", CommandKey({1, 2, 3}));
-    robot_ = std::make_unique<CommandReceiver>(
-        keys, runtime::CommandReceiverOptions{"", kPatience_s, {}},
-        std::make_unique<runtime::StreamWire>(std::make_unique<Terminal>(robots_)));
-    arguments_.url = "serial:" + device_ + ":" + std::to_string(baud);
-    arguments_.timeout_s = patience_s;
-    thread_ = std::thread([this, keys, requests] {
-      Conversation conversation(arguments_, keys);
-      conversation.find_robots();
-      found_ = true;
-      try {
-        arguments_.disarm ? conversation.disarm_all() : conversation.relay(requests);
-      } catch (const std::exception& failure) {
-        error_ = failure.what();
-      }
-      returned_ = true;
-    });
-    ASSERT_TRUE(soon([this] { return found_.load(); }));
-  }
-  void say(const std::string& text) const {
-    ASSERT_EQ(write(requests_[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
-  }
-  void end() {
-    if (requests_[1] >= 0) close(requests_[1]);
-    requests_[1] = -1;
-    if (thread_.joinable()) thread_.join();
-  }
-  /// The robot's loop, which does at once what it is told.
-  Command tick() {
-    const Command command = robot_->latest();
-    robot_->tell(command.arm || stays_on_ ? ArmState::kArmed : ArmState::kDisarmed);
-    return command;
-  }
-  template <class Wanted>
-  bool soon(Wanted&& wanted, double seconds = kPatience_s) {
-    const auto limit = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-    while (!wanted()) {
-      tick();
-      if (std::chrono::steady_clock::now() > limit) return false;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    return true;
-  }
-  /// Repeated, as a page does: a busy machine may have stopped the thread for long enough to void one.
-  bool asks(double speed_m_s) {
-    auto next = std::chrono::steady_clock::now();
-    return soon([&] {
-      if (std::chrono::steady_clock::now() >= next) {
-        say("drive " + std::to_string(speed_m_s) + " 0 0\n");
-        next += std::chrono::milliseconds(200);
-      }
-      return tick().velocity_W_m_s.x() == speed_m_s;
-    });
-  }
-  /// The thread stands still, as under Ctrl-Z, until it is resumed.
-  void stop_it() {
-    stopped = false;
-    resumed = false;
-    struct sigaction action {};
-    action.sa_handler = [](int) {
-      for (stopped = true; !resumed;) usleep(10'000);
-    };
-    sigaction(SIGUSR1, &action, nullptr);
-    pthread_kill(thread_.native_handle(), SIGUSR1);
-    ASSERT_TRUE(soon([] { return stopped.load(); }));
-  }
-  void resume_after(double seconds) {
-    soon([] { return false; }, seconds);
-    resumed = true;
-  }
-  /// A request that waits for the wire when the thread is stopped: none that has already been sent.
-  template <class Sent>
-  bool stop_it_before(const std::string& request, Sent&& sent, const std::string& undo) {
-    for (int attempt = 0; attempt < 10; ++attempt) {
-      if (!asks(0.1)) return false;
-      say(request);
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      stop_it();
-      if (!soon(sent, 0.3)) return true;
-      resumed = true;
-      say(undo);
-    }
-    return false;
-  }
-
-  int robots_ = -1, holders_ = -1;
-  int requests_[2] = {-1, -1};
-  std::string device_;
-  SendArguments arguments_;
-  bool stays_on_ = false;  // whatever it is told
-  std::unique_ptr<CommandReceiver> robot_;
-  std::atomic<bool> found_{false}, returned_{false};
-  std::string error_;  // once it has returned
-  std::thread thread_;
-  static inline std::atomic<bool> stopped{false}, resumed{false};
-};
 
 constexpr int kQuick = 115200;
 const std::vector<std::string> kLadder{"waiting", "armed", "fault"};
@@ -283,6 +144,110 @@ TEST_F(Relay, SaysWhatTheRobotConfirmsAndEachOnce) {
   }
   EXPECT_NE(std::search(states.begin(), states.end(), kLadder.begin(), kLadder.end()), states.end())
       << testing::PrintToString(states);
+}
+
+TEST_F(Relay, ARobotThatStartsAnewEndsIt) {
+  start(kQuick, requests_[0]);
+  robot_.reset();
+  start_robot();
+  ASSERT_TRUE(soon([&] { return returned_.load(); }));
+  EXPECT_EQ(error_, "mbbr has started anew, or there are two of that name");
+}
+
+TEST_F(Relay, WhoStopsWritingStopsTheMotion) {
+  start(kQuick, requests_[0]);
+  ASSERT_TRUE(asks(0.1));
+  EXPECT_TRUE(soon([&] { return tick().age_s > 1.0; })) << "a line is said once";
+}
+
+TEST_F(Relay, AMotionOfTheTurnBeforeIsVoid) {
+  start(kQuick, requests_[0]);
+  ASSERT_TRUE(asks(0.1));
+  say("drive 0.3 0 0\nheading-reset\n");
+  ASSERT_TRUE(soon([&] { return tick().heading_reset; }));
+  EXPECT_FALSE(soon([&] { return tick().velocity_W_m_s.x() == 0.3; }, 0.7));
+}
+
+TEST_F(Relay, AnArmInTheSameBreathAsADisarmIsVoid) {
+  start(kQuick, requests_[0]);
+  ASSERT_TRUE(asks(0.1));
+  say("arm\n");
+  ASSERT_TRUE(soon([&] { return tick().arm; }));
+  say("disarm\narm\n");
+  ASSERT_TRUE(soon([&] { return !tick().arm; }));
+  EXPECT_FALSE(soon([&] { return tick().arm; }, 0.7));
+}
+
+TEST_F(Relay, AnArmThatIsNotConfirmedInTimeIsForgottenADisarmIsNot) {
+  start(kQuick, requests_[0], 2.0);
+  ASSERT_TRUE(asks(0.1));
+  const auto said_to_the_deaf = [this](const std::string& request) {
+    ear_ = RobotsLines::kDeaf;
+    say(request);
+    soon([] { return false; }, 2.5);
+    ear_ = RobotsLines::kHears;
+  };
+  said_to_the_deaf("arm\n");
+  EXPECT_FALSE(soon([&] { return tick().arm; }, 0.7)) << "it would surprise";
+  say("arm\n");
+  ASSERT_TRUE(soon([&] { return tick().arm; }));
+  said_to_the_deaf("disarm\n");
+  EXPECT_TRUE(soon([&] { return !tick().arm; })) << "never too late";
+}
+
+TEST_F(Relay, AnArmThatIsStillOnItsWayDoesNotCancelTheDisarmBehindIt) {
+  start(kSlow, requests_[0]);
+  ASSERT_TRUE(asks(0.1));
+  ear_ = RobotsLines::kKeepsFirst;
+  for (const char* request : {"arm\n", "disarm\n"}) {
+    say(request);
+    soon([] { return false; }, 1.2);
+  }
+  ear_ = RobotsLines::kHears;
+  ASSERT_TRUE(soon([&] { return armings_ == 1; }));
+  EXPECT_TRUE(soon([&] { return !tick().arm; }));
+}
+
+TEST_F(Relay, WhoTakesOverMakesWhatTheOtherAsksForVoidUntilItIsTakenBack) {
+  int guests_robot = -1, guests_end = -1;
+  char name[64] = {};
+  ASSERT_EQ(openpty(&guests_robot, &guests_end, name, nullptr, nullptr), 0);
+  lines_.push_back(guests_robot);
+  testing::internal::CaptureStdout();
+  start(kQuick, requests_[0]);
+  ASSERT_TRUE(asks(0.1));
+  std::atomic<bool> disarmed{false};
+  std::thread guest([&] {
+    SendArguments arguments;
+    arguments.url = "serial:" + std::string(name) + ":" + std::to_string(kQuick);
+    arguments.holder = "guest";
+    arguments.timeout_s = kPatience_s;
+    arguments.disarm = true;
+    Conversation conversation(arguments, keys_);
+    conversation.find_robots();
+    conversation.disarm_all();
+    disarmed = true;
+  });
+  EXPECT_TRUE(soon([&] { return disarmed.load(); }));
+  guest.join();
+  soon([] { return false; }, 0.5);  // until it is known
+  say("drive 0.2 0 0\n");
+  EXPECT_FALSE(soon([&] { return tick().velocity_W_m_s.x() == 0.2; }, 0.5));
+  say("take\n");
+  EXPECT_TRUE(asks(0.3));
+  end();
+  const std::string said = testing::internal::GetCapturedStdout();
+  std::istringstream lines(said);
+  std::vector<std::string> mine;
+  for (std::string line; std::getline(lines, line);) {
+    const nlohmann::json now = nlohmann::json::parse(line);
+    const std::string whose = now["mine"] == true ? "mine" : "not mine";
+    const std::string state =
+        whose + " " + std::to_string(now["turn"].get<int>()) + now["holder"].get<std::string>();
+    if (mine.empty() || mine.back() != state) mine.push_back(state);
+  }
+  EXPECT_EQ(mine, (std::vector<std::string>{"mine 0", "not mine 1guest", "mine 1guest"})) << said;
+  for (const int fd : {guests_robot, guests_end}) close(fd);
 }
 
 TEST_F(Relay, AnInputThatCannotBeReadEndsIt) {
