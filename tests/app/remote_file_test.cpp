@@ -56,6 +56,9 @@ TEST(RemoteFile, IsReadStrictly) {
   EXPECT_THAT(refusal(kFrames + "arm = \"4142\"\ndisarm = \"41\"\n"), HasSubstr("begins with"));
   EXPECT_THAT(refusal(kFrames + "arm = \"4\"\ndisarm = \"61\"\n"), HasSubstr("hexadecimal"));
   EXPECT_THAT(refusal(kFrames + "arm = \"41\"\ndisarm = \"61\"\njump = \"46\"\n"), HasSubstr("jump"));
+  EXPECT_THAT(refusal(kFrames + "arm = \"41\"\ndisarm = \"61\"\n[other]\nx = 1\n"), HasSubstr("other"));
+  EXPECT_THAT(refusal("[remote]\ncolour = \"red\"\n" + kFrames.substr(9) + "arm = \"41\"\ndisarm = \"61\"\n"),
+              HasSubstr("colour"));
   const std::string events =
       "[remote]\nkind = \"events\"\ndevice = \"/dev/input/event0\"\nspeed_m_s = 0.1\nturn_hz = 0.25\n"
       "hold_s = 2.0\n[events]\narm = \"BTN_START\"\n";
@@ -151,6 +154,10 @@ TEST(RemoteFile, EventsAreNamedAsTheKernelNamesThem) {
   EXPECT_EQ(refused("turn_right = \"ABS_X\"\n"), "");
   EXPECT_THAT(refused("axis_range = [3, 3]\n"), HasSubstr("the lower number first"));
   EXPECT_THAT(refused("axis_range = [3, 2]\n"), HasSubstr("the lower number first"));
+  EXPECT_EQ(refused("axis_range = [-1000000000, 1000000000]\n"), "");
+  EXPECT_THAT(refused("axis_range = [0, 1000000001]\n"), HasSubstr("axis_range"));
+  EXPECT_THAT(refused("axis_range = [-1000000001, 0]\n"), HasSubstr("axis_range"));
+  EXPECT_THAT(refused("jump = \"KEY_J\"\n"), HasSubstr("jump"));
 }
 
 TEST(FrameMatcher, FindsFramesAmongRubbish) {
