@@ -72,6 +72,19 @@ TEST_F(Manager, HearsALoopThatTicksAndNotOneThatHangs) {
   EXPECT_EQ(heard(), std::vector<std::string>{"STOPPING=1"});
 }
 
+TEST_F(Manager, HearsOnceThatItIsReadyFromTheFirstTickOn) {
+  ServiceNotify service;
+  const auto comes = [&] {
+    std::vector<std::string> told;
+    for (int i = 0; told.empty() && i < 400; ++i, wait(5)) told = heard();
+    return told;
+  };
+  service.note(0);
+  EXPECT_EQ(comes(), std::vector<std::string>{"READY=1\nWATCHDOG=1"});
+  service.note(1);
+  EXPECT_EQ(comes(), std::vector<std::string>{"WATCHDOG=1"});
+}
+
 TEST_F(Manager, IsFoundUnderANameWithoutAFile) {
   const std::string name = std::string(1, '\0') + "equipoise-test-" + std::to_string(getpid());
   sockaddr_un address{};
@@ -90,8 +103,9 @@ TEST_F(Manager, IsFoundUnderANameWithoutAFile) {
 
 /// Without a watchdog a beat a second is enough, but ready is said at once.
 TEST_F(Manager, WithoutAWatchdogHearsAtOnceThatItIsReady) {
-  for (const char* allowed : {"", "0", "-5", "soon"}) {
+  for (const char* allowed : {"none", "", "0", "-5", "soon"}) {
     setenv("WATCHDOG_USEC", allowed, 1);
+    if (allowed == std::string("none")) unsetenv("WATCHDOG_USEC");
     (void)heard();  // the end of the one before
     ServiceNotify service;
     const auto began = std::chrono::steady_clock::now();
