@@ -109,7 +109,9 @@ TEST(SixFaces, RefusesMissingFacesByName) {
   std::vector<Vec3> faces = six_faces();
   faces[1] = faces[0];
   faces.pop_back();
-  EXPECT_THAT(complaint([&] { fit_six_faces(faces, faces[0]); }), HasSubstr("never up: -x, -z"));
+  EXPECT_THAT(complaint([&] { fit_six_faces(faces, faces[0]); }), HasSubstr("never up: -x, -z;"));
+  EXPECT_THAT(complaint([&] { fit_six_faces({}, faces[0]); }),
+              HasSubstr("never up: +x, +y, +z, -x, -y, -z;"));
 }
 
 TEST(SixFaces, RefusesWhatNoChipDoes) {
@@ -161,6 +163,13 @@ TEST(MountRotation, RefusesTooLittleTiltAndNoGravity) {
   const Vec3 up(0, 0, kGravity_m_s2);
   EXPECT_THAT(complaint([&] { mount_rotation(up, {0.9, 0, 9.75}, Vec3::UnitY()); }), HasSubstr("5 degrees"));
   EXPECT_THAT(complaint([&] { mount_rotation(1.5 * up, up, Vec3::UnitY()); }), HasSubstr("14.7 m/s2"));
+  for (int i = 0; i < 20; ++i) {  // a unit vector times itself is 1 up to rounding, either way
+    const Vec3 any = kGravity_m_s2 * Vec3(1.0, 2.0 + 0.1 * i, 3.0).normalized();
+    EXPECT_THAT(complaint([&] { mount_rotation(any, any, Vec3::UnitY()); }),
+                HasSubstr("tipped by 0 degrees"));
+    EXPECT_THAT(complaint([&] { mount_rotation(any, -any, Vec3::UnitY()); }),
+                HasSubstr("tipped by 180 degrees"));
+  }
 }
 
 TEST(MountRotation, TakesTiltsOf15To120DegreesAndGravityWithinATenth) {
