@@ -86,6 +86,16 @@ TEST(Verdict, ARequestIsTimedFromItsOwnBeginning) {
   EXPECT_EQ(judge.verdict(false, false).fell_at_s, 2.11);
 }
 
+TEST(Verdict, AMomentForARequestIsATenthOfASecond) {
+  VerdictJudge judge;
+  for (const double t_s : {0.0, 0.09, 0.1}) {
+    judge.observe({t_s, true, false, kBatteryLow, kUnknown});
+    EXPECT_FALSE(judge.refused()) << t_s;
+  }
+  judge.observe({0.11, true, false, kBatteryLow, kUnknown});
+  EXPECT_TRUE(judge.refused());
+}
+
 TEST(Verdict, ATiltNearTheFallIsOneWhereSafetySaysSo) {
   const auto ended = [](double tilt_rad, std::uint32_t reasons) {
     VerdictJudge judge = balancing();
@@ -96,8 +106,10 @@ TEST(Verdict, ATiltNearTheFallIsOneWhereSafetySaysSo) {
   EXPECT_EQ(ended(0.53, kTilt), Ended::kDisarmed);
   EXPECT_EQ(ended(0.59, kImuStale), Ended::kDisarmed);
   EXPECT_EQ(ended(0.61, kImuStale), Ended::kFell);
+  EXPECT_EQ(ended(VerdictJudge::kFallenTilt_rad, kImuStale), Ended::kDisarmed) << "further, it says";
+  EXPECT_EQ(ended(0.9 * VerdictJudge::kFallenTilt_rad, kTilt), Ended::kFell);
   VerdictJudge upright = balancing();
-  upright.observe({3.2, true, true, 0, 0.59});
+  upright.observe({3.2, true, true, 0, VerdictJudge::kFallenTilt_rad});
   EXPECT_FALSE(upright.lost());
 }
 
@@ -201,6 +213,34 @@ TEST(Verdict, ASensorsIsListedWhenItIsTakenAndWhenItIsTakenBack) {
             "verdict: encoder_2, log-likelihood ratio 21.4, bound 18.6, runner-up encoder_1 3.0");
   EXPECT_EQ(lines.at(1),
             "verdict taken back: encoder_2, log-likelihood ratio 19.0, bound 18.6, runner-up no fault 0.0");
+}
+
+/// What is printed under the sentence: what was said of the sensors, and why a robot was lost.
+TEST(Verdict, ItsReasonsArePrintedForALostRobotAndItsSensorsForEach) {
+  const auto printed = [](const Verdict& verdict) {
+    char* text = nullptr;
+    std::size_t size = 0;
+    std::FILE* const out = open_memstream(&text, &size);
+    print_reasons(out, verdict, SafetyParams{});
+    std::fclose(out);
+    const std::string said(text, size);
+    std::free(text);
+    return said;
+  };
+  VerdictJudge judge = balancing();
+  EXPECT_EQ(printed(judge.verdict(false, false)), "");
+  judge.observe({3.1, true, true, 0, 0.1, {}, {kSecond, 21.44, 18.6, kFirst, 3.0, true, 1U << kSecond}});
+  const std::string sensor = printed(judge.verdict(false, false));
+  EXPECT_EQ(sensor, "  3.100 s  " + sentences(judge.verdict(false, false)).at(0) + "\n");
+  judge.observe({3.2, true, false, kImuStale, 0.1});
+  const Verdict lost = judge.verdict(false, false);
+  const std::string all = printed(lost);
+  ASSERT_EQ(all.substr(0, sensor.size()), sensor);
+  std::string reasons;
+  for (const std::string& line : reasons_explained(lost.reasons, lost.numbers, SafetyParams{}))
+    reasons.append("  ").append(line).append("\n");
+  EXPECT_EQ(all.substr(sensor.size()), reasons);
+  EXPECT_NE(reasons, "");
 }
 
 TEST(Verdict, TwoOfOneTickLeaveTheSensorOpenAndTheTickThatLosesTheRobotCounts) {
