@@ -9,6 +9,11 @@
 #include "equipoise/types.hpp"
 
 namespace equipoise::app {
+namespace {
+
+double now_ms() noexcept { return 1e3 * runtime::now_s(); }
+
+}  // namespace
 
 Hand HandGate::limit(const Hand& hand) noexcept {
   Hand allowed = hand;
@@ -28,8 +33,7 @@ std::unique_ptr<HandDevice> open_hand(const RemoteFile& file) {
 }
 
 HandRemote::HandRemote(std::unique_ptr<HandDevice> device, Options options)
-    : started_ns_(runtime::monotonic_now_ns()),
-      options_(std::move(options)),
+    : options_(std::move(options)),
       device_(std::move(device)),
       wish_(runtime::CommandWish{}),
       thread_([this] { run(); }) {}
@@ -37,10 +41,6 @@ HandRemote::HandRemote(std::unique_ptr<HandDevice> device, Options options)
 HandRemote::~HandRemote() {
   stop_.store(true);
   thread_.join();
-}
-
-double HandRemote::now_ms() const noexcept {
-  return 1e-6 * static_cast<double>(runtime::monotonic_now_ns() - started_ns_);
 }
 
 void HandRemote::run() {

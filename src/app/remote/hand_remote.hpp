@@ -45,10 +45,8 @@ class HandRemote final : public runtime::Remote {
   void tell(ArmState state) noexcept override { follower_.tell(state); }
 
  private:
-  double now_ms() const noexcept;
   void run();
 
-  const std::int64_t started_ns_;
   const Options options_;
   std::unique_ptr<HandDevice> device_;
   runtime::LatestValue<runtime::CommandWish> wish_;
