@@ -81,7 +81,6 @@ AccelFit fit_six_faces(const std::vector<Vec3>& accel, const Vec3& check) {
     const Eigen::VectorXd step = J.colPivHouseholderQr().solve(-residual);
     fit.scale_S += step.head<3>();
     fit.bias_S_m_s2 += step.tail<3>();
-    if (step.norm() < 1e-12) break;
   }
   fit.check_error_m_s2 = std::abs((fit.scale_S.cwiseProduct(check) - fit.bias_S_m_s2).norm() - kGravity_m_s2);
   const double scale_error = (fit.scale_S - Vec3::Ones()).cwiseAbs().maxCoeff();
