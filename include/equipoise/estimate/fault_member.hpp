@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <utility>
 
@@ -11,6 +12,30 @@
 #include "equipoise/estimate/used_sensors.hpp"
 
 namespace equipoise {
+
+/// How noisy a filter is told that its samples are: at least as the control's that it is made of.
+template <class Filter, int Wheels>
+class SampleNoise {
+ public:
+  explicit SampleNoise(const Filter& quiet) noexcept {
+    for (std::size_t i = 0; i < quiet_.size(); ++i) quiet_[i] = quiet.row_noise(i);
+  }
+  void vibrate(Filter& filter, double sigma_rad_s,
+               const std::array<double, 3>& least_rad_s = {}) const noexcept {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double sigma = std::max(sigma_rad_s, least_rad_s[i]);
+      filter.set_row_noise(i, std::max(quiet_[i], sigma * sigma));
+    }
+  }
+  void shake(Filter& filter, double gyro_rad_s, double accel_m_s2) const noexcept {
+    vibrate(filter, gyro_rad_s);
+    for (std::size_t i = Filter::Model::kWheel + Wheels; i < quiet_.size(); ++i)
+      filter.set_row_noise(i, std::max(quiet_[i], accel_m_s2 * accel_m_s2));
+  }
+
+ private:
+  std::array<double, Filter::Model::kOutputs> quiet_{};  // variances
+};
 
 template <class Filter, int Wheels>
 struct FaultMember {
@@ -30,13 +55,6 @@ struct FaultMember {
   int returns = -1;         // row of an excluded sensor that may be healthy again
   double from = 0.0;        // what that read when the member began
 
-  /// Noisier samples of the IMU, for good.
-  void shake() noexcept {
-    constexpr auto kAccel = static_cast<std::size_t>(Filter::Model::kWheel) + std::size_t{Wheels};
-    for (std::size_t i = 0; i < 3; ++i) filter.set_row_noise(i, kNoise_rad_s * kNoise_rad_s);
-    for (std::size_t i = kAccel; i < static_cast<std::size_t>(Filter::Model::kOutputs); ++i)
-      filter.set_row_noise(i, kNoise_m_s2 * kNoise_m_s2);
-  }
   template <class Sample>
   void innovate(const Sample& z) noexcept {
     owes = z.imu_ok || z.encoders_ok;

@@ -36,12 +36,12 @@ class SensorFaults {
       : p_(params),
         gross_(params.balances),
         weigh_(params.evidence),
+        noise_(filter),
         healthy_(with_noise(filter, params)),
         before_(healthy_),
         predicted_(healthy_),
         members_(filled(healthy_, std::make_index_sequence<kCount>())) {
-    for (std::size_t i = 0; i < 3; ++i) quiet_[i] = filter.row_noise(i);
-    members_[fault_index<Wheels>(FaultHypothesis::kNoise)].shake();
+    noise_.shake(members_[kNoise].filter, Member::kNoise_rad_s, Member::kNoise_m_s2);
     reset(filter, 0.0);
   }
 
@@ -64,7 +64,7 @@ class SensorFaults {
     evidence_ = {-1, 0.0, kBound, -1, 0.0, false, ticks_++ == 0 ? 0 : evidence_.verdicts};
     ran_ = 2;
     const Sample z = gross_.without(raw, expected_rad_s + used_.bias_rad_s);
-    hear_vibration(control, {});
+    hear_noise(control);
     used_.predict(control, u);
     control.update(used_.with_axes(rocking()).of(z));
     if (!raw.imu_ok || !raw.encoders_ok) {  // nothing to weigh against each other
@@ -106,6 +106,7 @@ class SensorFaults {
   using Member = FaultMember<Filter, Wheels>;
   static constexpr auto kRows = fault_rows<Wheels>();
   static constexpr bool kRocks = kRocksOn<Wheels>;
+  static constexpr std::size_t kNoise = fault_index<Wheels>(FaultHypothesis::kNoise);
   static constexpr std::uint32_t kAhead = 1U << 1;  // the gyro's axis about which it rocks
 
   // Decisions, in nats. A false alarm in ten hours of ticks and sixteen hypotheses: ln(7.2e6 * 16)
@@ -134,12 +135,12 @@ class SensorFaults {
     return {((void)I, Member{filter})...};
   }
 
-  /// The gyro is as noisy as it has been lately.
-  void hear_vibration(Filter& filter, const std::array<double, 3>& least_rad_s) const noexcept {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const double sigma = std::max(weigh_.vibration_rad_s(), least_rad_s[i]);
-      filter.set_row_noise(i, std::max(quiet_[i], sigma * sigma));
-    }
+  /// Control's IMU is noisier while that hypothesis leads. What merely vibrates an MBBR follows: with less
+  /// weight on its gyro three wheels that slip lead it astray.
+  void hear_noise(Filter& control) const noexcept {
+    if (kRocks) return noise_.vibrate(control, weigh_.vibration_rad_s());
+    const bool leads = leader_ == kNoise && members_[kNoise].ratio > 0.0;
+    noise_.shake(control, leads ? weigh_.vibration_rad_s() : 0.0, leads ? Member::kNoise_m_s2 : 0.0);
   }
 
   void begin_all() noexcept {
@@ -171,7 +172,7 @@ class SensorFaults {
 
   void advance_all(const Input& u, const Sample& z) noexcept {
     before_.adopt(healthy_);
-    hear_vibration(healthy_, p_.evidence.gyro_sigma_rad_s);
+    noise_.vibrate(healthy_, weigh_.vibration_rad_s(), p_.evidence.gyro_sigma_rad_s);
     used_.predict(healthy_, u);
     predicted_.adopt(healthy_);
     const Sample used = used_.of(z);
@@ -208,7 +209,7 @@ class SensorFaults {
       if (anew ? most <= 0.0 : most <= -kMargin && !m.apart) return m.refute(-kMargin);
     }
     ++ran_;
-    if (h.kind != FaultHypothesis::kNoise) hear_vibration(m.filter, p_.evidence.gyro_sigma_rad_s);
+    if (i != kNoise) noise_.vibrate(m.filter, weigh_.vibration_rad_s(), p_.evidence.gyro_sigma_rad_s);
     if (anew) begin(i, before_, predicted_);
     if (!anew) m.used.predict(m.settled(), u);
     m.allow(h);
@@ -352,8 +353,7 @@ class SensorFaults {
   /// slip far (encoder_slip.hpp). It knows of no noisier samples.
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].settled());
-    if (kRocks ? !kHypotheses[event].pushes() : kHypotheses[event].kind == FaultHypothesis::kNoise)
-      control.adopt(healthy_);
+    if (kRocks ? !kHypotheses[event].pushes() : event == kNoise) control.adopt(healthy_);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.depart(ratio, -kMargin);
     begin(event, healthy_, healthy_);
@@ -382,6 +382,7 @@ class SensorFaults {
   SensorFaultsParams p_;
   GrossSamples gross_;
   Evidence weigh_;
+  SampleNoise<Filter, Wheels> noise_;
   RollWatch roll_;
   Filter healthy_;    // with everything that is used
   Filter before_;     // a tick ago
@@ -389,8 +390,7 @@ class SensorFaults {
   std::array<Member, kCount> members_;
   Used used_;
   FaultEvidence evidence_;
-  std::array<double, 3> quiet_{};  // the gyro's variances
-  bool stale_ = true;              // members have missed a tick
+  bool stale_ = true;  // members have missed a tick
   bool trusted_ = true, suspects_ = false;
   int ticks_ = 0, jumps_ = 0, ran_ = 1;  // since arming; filters in this tick
   int mirrored_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks

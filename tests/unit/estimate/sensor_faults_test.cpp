@@ -220,6 +220,31 @@ TEST_F(Standing, NoiseThatGrowsIsNoFault) {
   EXPECT_EQ(detector.bias_jumps(), 0);
 }
 
+/// With less weight on its gyro an MBBR follows wheels that slip.
+TEST_F(Standing, ControlTakesABurstForNoiseAndFollowsWhatVibrates) {
+  for (const double sigma_rad_s : {0.04, 0.35}) {
+    Detector detector = armed();
+    const double gyro = control.row_noise(0);
+    const double accel = control.row_noise(6);
+    int noisier = 0;  // ticks, of 0.3 s
+    for (int tick = 0; tick < 460; ++tick) {
+      const bool shaken = tick >= 400;
+      gyro_sigma_rad_s = shaken ? sigma_rad_s : 0.0015;
+      Sample z = sample();
+      if (shaken) z.accel_B_m_s2 += 14.0 * sigma_rad_s * Vec3(normal(random), normal(random), normal(random));
+      detector.step(control, Vec3::Zero(), z, Vec3::Zero());
+      ASSERT_EQ(control.row_noise(0) > gyro, control.row_noise(6) > accel) << tick;
+      noisier += control.row_noise(0) > gyro ? 1 : 0;
+    }
+    if (sigma_rad_s < 0.1)
+      EXPECT_EQ(noisier, 0);
+    else
+      EXPECT_GE(noisier, 10);
+    detector.reset(control, 0.0015);
+    detector.step(control, Vec3::Zero(), at_rest(), Vec3::Zero());
+  }
+}
+
 TEST_F(Standing, ABiasThatJumpsIsTakenOff) {
   Detector detector = armed();
   int found = 0;
