@@ -59,6 +59,7 @@ TEST(Verdict, ARequestThatIsWithdrawnIsNoFall) {
   judge.observe({3.2, false, false, kNotRequested, 0.02});
   EXPECT_FALSE(judge.lost());
   EXPECT_EQ(judge.verdict(true, false).ended, Ended::kInterrupted);
+  EXPECT_EQ(judge.verdict(true, false).reasons, kNotRequested) << "at the end, of a run that was not lost";
 }
 
 TEST(Verdict, ARobotThatNeverArmedIsDisarmed) {
