@@ -53,7 +53,8 @@ TEST(GyroBias, OneCountOfAWheelIsRest) {
 TEST(GyroBias, RefusesMotionAndSaysHowMuch) {
   Stillness shaken = at_rest(Vec3::Zero());
   shaken.gyro_sigma.y() = 3.0 * 16.4;
-  EXPECT_THAT(complaint([&] { gyro_bias(shaken, Calibration{}); }), HasSubstr("3.00 deg/s of shaking"));
+  EXPECT_THAT(complaint([&] { gyro_bias(shaken, Calibration{}); }),
+              HasSubstr("3.00 deg/s of shaking (allowed 0.40), 0.00 deg/s of change (allowed 0.10)"));
   Stillness speeding = at_rest(Vec3::Zero());
   speeding.gyro_drift.z() = -0.5 * 16.4;
   EXPECT_THAT(complaint([&] { gyro_bias(speeding, Calibration{}); }), HasSubstr("0.50 deg/s of change"));

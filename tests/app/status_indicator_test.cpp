@@ -55,6 +55,8 @@ TEST(StatusIndicator, FrameHoldsEveryReason) {
   std::uint32_t read = 0;
   for (unsigned i = 0; i < 4; ++i) read |= std::uint32_t{frame.data[2 + i]} << (8U * i);
   EXPECT_EQ(read, reasons);
+  EXPECT_EQ(frame.data[6], 0);
+  EXPECT_EQ(frame.data[7], 0);
 }
 
 }  // namespace
