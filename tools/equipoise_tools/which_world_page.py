@@ -175,7 +175,8 @@ def page(found: Inference, firmware: list[str]) -> str:
         "The only measurements of the real MBBR are [T]'s: where it stood, fell, and its filters' errors. "
         f"Of {len(found.parameters)} parameters and conventions, {len(found.draws)} draws "
         f"were simulated ({DURATION_S:g} s each, one seed a draw); {len(found.kept)} are kept, worth "
-        f"{effective(found.kept):.0f} independent ones by their weights. An error agrees within "
+        f"{effective(found.kept):.0f} independent ones by their weights: where few, intervals say where good "
+        "draws lie, not how likely they are. An error agrees within "
         f"{100 * WITHIN:.0f} %. "
         "Distance: mean over all statements, 1 where it just agrees, "
         f"{FAR:g} at most; kept are {found.kept[0].distance:.2f} to {found.kept[-1].distance:.2f}. "
@@ -211,8 +212,8 @@ def page(found: Inference, firmware: list[str]) -> str:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="tools/lab world", description=__doc__)
     parser.add_argument("--minutes", type=float, default=40.0, help="no generation begins later")
-    parser.add_argument("--size", type=int, default=60, help="draws of the first generation")
-    parser.add_argument("--keep", type=int, default=20, help="of each; the next has SIZE - KEEP new ones")
+    parser.add_argument("--size", type=int, default=180, help="draws of the first generation")
+    parser.add_argument("--keep", type=int, default=60, help="of each; the next has SIZE - KEEP new ones")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument(
