@@ -161,6 +161,14 @@ def test_ends_its_robot_with_itself(root, logs):
     until(lambda: not Path(f"/proc/{firmware}").exists(), "the robot ends with its cockpit")
 
 
+@pytest.mark.parametrize("attempt", range(3))
+def test_ctrl_c_ends_it_while_its_robot_starts_anew(root, logs, attempt):
+    started = Started(root, logs)
+    until(lambda: len(started.children()) == 2, "robot and sender run")
+    in_a_loop(talk(started, [{"do": "take"}, {"do": "restart"}], token=started.token, answers=4))
+    started.end()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

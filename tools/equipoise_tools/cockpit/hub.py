@@ -269,6 +269,7 @@ class Cockpit:
             self.record(False)
 
     async def close(self) -> None:
+        await self._starting.acquire()  # for good: a restart has ended, and none begins
         self.record(False)
         if self.remote is not None:
             await self.remote.stop()
