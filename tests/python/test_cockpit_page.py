@@ -33,6 +33,8 @@ def page(browser):
     errors = []
     made.on("pageerror", lambda error: errors.append(str(error)))
     yield made
+    # Shown where a test fails: why it did not arm or drive.
+    print(made.inner_text("body"), "focus:", made.evaluate("document.hasFocus()"))
     made.close()
     assert errors == []
 
@@ -78,6 +80,8 @@ def take_and_arm(page) -> None:
     page.wait_for_selector("#arm:enabled")
     page.click("#arm")
     page.wait_for_selector("#state[data-state=armed]")
+    # The robot's state comes before its answer to the sender: what is pushed between them waits to be let go.
+    until(lambda: shown(page, "cockpit.status.remote.status.state") == "armed", "the page may drive")
 
 
 def test_arms_drives_stops_and_survives_a_restart(page, cockpit):
