@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <complex>
-#include <limits>
 
 #include "equipoise/control/friction.hpp"
 #include "robots/mbbr/scheduled_feedback.hpp"
@@ -290,33 +289,6 @@ TEST(MbbrScheduledFeedback, IsTheComplexGainsTimesTheErrors) {
     EXPECT_EQ(u(&MbbrReference::d_rate, {-1.0, 0.0}), Vec2(2.0, way * -0.5));
     EXPECT_EQ(u(&MbbrReference::d_phi_dot_unfiltered, {-1.0, 0.0}), Vec2(1.0, way * 0.125));
   }
-}
-
-TEST(MbbrScheduledFeedback, FeedsForwardSpeedAccelerationAndItsRate) {
-  MbbrScheduledFeedbackParams p;
-  p.gains.schedule.rows = 1;
-  p.gains.schedule.row[0] = {8.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  p.gains.speed = 0.5;
-  p.gains.speed_turn = 0.125;
-  p.gains.drive = 0.25;
-  p.gains.lean = 0.0625;
-  const auto u = [&p](Vec2 MbbrReference::*what, const Vec2& value) {
-    MbbrReference ref;
-    ref.yaw_rate = 4.0;
-    ref.*what = value;
-    return Vec2(MbbrScheduledFeedback(p).update(ref).head<2>());
-  };
-  EXPECT_EQ(u(&MbbrReference::phi_dot_star, {2.0, 0.0}), Vec2(1.0, -1.0)) << "turned by the spin";
-  EXPECT_EQ(u(&MbbrReference::phi_ddot_star, {0.0, 4.0}), Vec2(0.0, 1.0 - 8.0 * 0.25)) << "beside its lean";
-  EXPECT_EQ(u(&MbbrReference::phi_dddot_star, {4.0, 0.0}), Vec2(-2.0 * 0.25, 0.0));
-}
-
-TEST(MbbrScheduledFeedback, OneNumberThatIsNotFiniteIsForgotten) {
-  MbbrScheduledFeedback feedback(scheduled_params());
-  MbbrReference ref;
-  ref.d_theta.x() = std::numeric_limits<double>::quiet_NaN();
-  (void)feedback.update(ref);
-  EXPECT_EQ(feedback.update(MbbrReference{}), Vec3(0.0, 0.0, 0.0));
 }
 
 /// At a constant acceleration of the ball the body holds a lean: both from the linear model.
