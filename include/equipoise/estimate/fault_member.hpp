@@ -20,6 +20,7 @@ class SampleNoise {
   explicit SampleNoise(const Filter& quiet) noexcept {
     for (std::size_t i = 0; i < quiet_.size(); ++i) quiet_[i] = quiet.row_noise(i);
   }
+  /// The gyro, by one sigma for all axes, at least by each one's.
   void vibrate(Filter& filter, double sigma_rad_s,
                const std::array<double, 3>& least_rad_s = {}) const noexcept {
     for (std::size_t i = 0; i < 3; ++i) {
@@ -27,6 +28,7 @@ class SampleNoise {
       filter.set_row_noise(i, std::max(quiet_[i], sigma * sigma));
     }
   }
+  /// Gyro and accelerometer.
   void shake(Filter& filter, double gyro_rad_s, double accel_m_s2) const noexcept {
     vibrate(filter, gyro_rad_s);
     for (std::size_t i = Filter::Model::kWheel + Wheels; i < quiet_.size(); ++i)

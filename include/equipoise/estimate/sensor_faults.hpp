@@ -135,8 +135,8 @@ class SensorFaults {
     return {((void)I, Member{filter})...};
   }
 
-  /// Control's IMU is noisier while that hypothesis leads. What merely vibrates an MBBR follows: with less
-  /// weight on its gyro three wheels that slip lead it astray.
+  /// An eduMIP's control takes what vibrates for noise. An MBBR's follows it, for with less weight on the
+  /// gyro three wheels that slip lead it astray; its IMU is noisier only while that hypothesis leads.
   void hear_noise(Filter& control) const noexcept {
     if (kRocks) return noise_.vibrate(control, weigh_.vibration_rad_s());
     const bool leads = leader_ == kNoise && members_[kNoise].ratio > 0.0;
@@ -350,7 +350,7 @@ class SensorFaults {
 
   /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
   /// The control's filter takes a push by itself, one on three wheels a slip, too: it lets go of wheels that
-  /// slip far (encoder_slip.hpp). It knows of no noisier samples.
+  /// slip far (encoder_slip.hpp). Of noisier samples it has heard only since that led.
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].settled());
     if (kRocks ? !kHypotheses[event].pushes() : event == kNoise) control.adopt(healthy_);
