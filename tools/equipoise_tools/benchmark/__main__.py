@@ -14,7 +14,7 @@ from equipoise_robot import _core
 from ..campaign import Progress
 from ..entry import leave
 from ..paths import UserError, repository_root
-from . import runs, score, tuning
+from . import picture, runs, score, tuning
 from .peers import PEERS
 from .workers import Workers
 
@@ -144,9 +144,11 @@ def main(words: list[str] | None = None) -> int:
         page = score.page(told, about)
         path.write_text(kept)
         path.with_name(PAGE.name).write_text(page)
+        picture.draw(told, path.with_name(PAGE.name))
         if given.write:
             KEPT.write_text(kept)
             PAGE.write_text(page)
+            picture.draw(told, PAGE)
         print(path)
     except (UserError, OSError, ModuleNotFoundError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -108,6 +108,8 @@ def page(told: list[dict], about: dict) -> str:
         f"`{about['fidelity']}`, one run at each point and in each engine; version {about['version']}. "
         "Upright and armed after 12 s, in percent; ▼: ours is ahead, ▲: the peer is, by the 95 % interval of "
         "the difference.",
+        "",
+        "![Share upright with 95 % intervals, at each point for each peer](benchmark.png)",
     ]
     for kind in dict.fromkeys(s["kind"] for s in told):
         lines += ["", f"| {kind} | engine | {' | '.join(names)} |", "|---" * (len(names) + 2) + "|"]
