@@ -54,6 +54,25 @@ def test_the_sliding_modes_error_is_the_quaternions():
     assert peers.Sliding.vector([0.2], [0.1]) == pytest.approx([2 * np.sin(0.05), 0.0])
 
 
+def test_the_quaternion_peers_error_is_the_whole_attitudes():
+    from scipy.spatial.transform import Rotation
+
+    x, y, heading = 0.3, -0.2, 2.0
+    q = (Rotation.from_euler("YX", [y, x]).inv() * Rotation.from_euler("Z", heading)).as_quat()
+    assert peers.Quaternion.error(x, y, heading) == pytest.approx([q[3], *q[:3]], abs=1e-12)
+
+
+def test_the_quaternion_peers_gains_are_the_planes_and_couple_as_it_spins():
+    ball = sensing.known(runs.config_path("mbbr"))
+    told = peers.Quaternion(ball, lone("quaternion"))
+    still = told.solve(0.0)
+    assert still[0, [0, 6, 3, 8, 10]] == pytest.approx(
+        peers.lqr(ball, {**lone("lqr"), "tilt": 2.0}), rel=1e-6
+    )
+    assert still[0, 1] == pytest.approx(0.0, abs=1e-9)
+    assert abs(told.solve(12.0)[0, 1]) > 0.05 * abs(still[0, 0])
+
+
 @pytest.mark.parametrize("engine", runs.ENGINES)
 @pytest.mark.parametrize("kind", runs.CONFIGS)
 @pytest.mark.parametrize("peer", OTHERS)

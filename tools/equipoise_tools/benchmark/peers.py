@@ -64,6 +64,9 @@ class Feedback:
         if self.senses.held or self.was_held:
             self.restart()
         self.was_held = self.senses.held
+        return self.drive(tick)
+
+    def drive(self, tick) -> list[float]:
         error = tick.error.tolist()[-2:]
         wanted = float(tick.reference.omega_B_rad_s[2])
         rates = tick.reference.phi_dot_rad_s.tolist()
@@ -159,6 +162,67 @@ class Sliding(Lqr):
         return float((asked - natural) / self.robot.b[2])
 
 
+class Quaternion(Lqr):
+    """LQR of the attitude's quaternion error, rates and travel, after Kugle's papers: tilts and yaw are one
+    linear model about the wanted spin, with one gain matrix."""
+
+    def __init__(self, robot: Known, factors: Factors) -> None:
+        super().__init__(robot, factors)
+        self.factors = factors
+        self.gains: dict[int, np.ndarray] = {}  # by spin in rad/s
+        self.most = MAX_LEAN_RAD * abs(self.k[0] / self.k[1])  # rad of travel
+
+    def solve(self, spin: float) -> np.ndarray:
+        """State: twice the quaternion's vector part, body rates, travel, its rate, u of the last tick."""
+        robot, factors = self.robot, self.factors
+        n, m = robot.axes, robot.axes + 1
+        size = 2 * m + 2 * n
+        block, q = np.zeros((size + m, size + m)), np.zeros((size + m, size + m))
+        for i in range(n):
+            state = [i, 2 * m + i, m + i, 2 * m + n + i]  # as the plane has it
+            block[np.ix_(state, state)], block[state, size + i] = robot.a, robot.b
+            q[np.ix_(state, state)] = weights({**factors, "tilt": 2.0 * factors["tilt"]})  # spinning needs it
+        for i in (0, m, 2 * m, 2 * m + n) if n == 2 else ():  # what stays as it is turns in the body's axes
+            block[i, i + 1] += spin
+            block[i + 1, i] -= spin
+        block[n, n + m], block[n + m, size + n] = 1.0, robot.yaw_gain
+        q[n, n], q[n + m, n + m] = (factors["yaw"] / 0.5) ** 2, 1.0 / 5.0**2  # rad, rad/s
+        a, b = expm(block * STEP_S), np.eye(size + m)[:, size:]
+        a[size:] = 0.0
+        p = solve_discrete_are(a, b, q, np.eye(m))
+        return np.linalg.solve(np.eye(m) + b.T @ p @ b, b.T @ p @ a)
+
+    def restart(self) -> None:
+        self.before = [0.0] * (self.robot.axes + 1)
+
+    def drive(self, tick) -> list[float]:
+        errors, n = self.senses.errors(tick), self.robot.axes
+        x, y = [*(-e[0] for e in errors), 0.0][:2]
+        w, *vector = self.error(x, y, float(tick.error[-2]))
+        spin = float(tick.reference.omega_B_rad_s[2])
+        up = -math.sin(y), math.sin(x) * math.cos(y), math.cos(x) * math.cos(y)  # the world's, in the body
+        rates = [spin * a - b for a, b in zip(up, self.senses.omega, strict=True)]
+        kept = [0, 1, 2] if n == 2 else [0, 2]
+        state = [math.copysign(2.0, w) * vector[i] for i in kept] + [rates[i] for i in kept]
+        state += [clamp(e[1], self.most) for e in errors] + [e[3] for e in errors]
+        near = round(spin)
+        if near not in self.gains:
+            self.gains[near] = self.solve(near)
+        u = self.gains[near] @ [*state, *(-b for b in self.before)]
+        self.before = [clamp(value, MOST_U) for value in u.tolist()]
+        wanted = tick.reference.phi_dot_rad_s.tolist()
+        held = [self.robot.hold_s * wanted[i] for i in range(n)] + [self.robot.yaw_hold_s * spin]
+        return [a + b for a, b in zip(self.before, held, strict=True)]
+
+    @staticmethod
+    def error(x: float, y: float, heading: float) -> tuple[float, float, float, float]:
+        """conj(there) * wanted: there Ry Rx, wanted Rz of the heading's error."""
+        cx, sx, cy, sy = math.cos(x / 2), math.sin(x / 2), math.cos(y / 2), math.sin(y / 2)
+        c, s = math.cos(heading / 2), math.sin(heading / 2)
+        w, i, j, k = cy * cx, -cy * sx, -sy * cx, sy * sx
+        return w * c - k * s, i * c + j * s, j * c - i * s, k * c + w * s
+
+
 @dataclass(frozen=True)
 class Peer:
     """`knobs`: what the search may scale, and its bounds; `make`: where it is none of the firmware's own."""
@@ -178,6 +242,11 @@ PEERS = {
         Peer(DISSERTATION),  # as published: nothing to search
         Peer("pid", dict.fromkeys(("P", "I", "D", "speed", "travel", "yaw"), WIDE), CascadePid),
         Peer("lqr", dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE), Lqr),
+        Peer(
+            "quaternion",
+            dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE),
+            Quaternion,
+        ),
         Peer(
             "sliding",
             dict.fromkeys(("slope", "reach", "boundary", "speed", "travel", "filter", "rates", "yaw"), WIDE),

@@ -72,6 +72,7 @@ class Senses:
         self.theta, self.theta_dot, self.phi, self.phi_dot = ([0.0, 0.0] for _ in range(4))
         self.yaw = self.yaw_rate = 0.0
         self.gyro, self.bias, self.held_ticks, self.held = [0.0] * 3, [0.0] * 3, 0, True
+        self.omega = [0.0] * 3  # of the body
 
     def __call__(self, tick) -> State:
         if tick.held and not self.held:
@@ -82,13 +83,13 @@ class Senses:
         if self.held and tick.imu_ok:  # at rest the gyro's bias is its mean
             self.held_ticks += 1
             self.bias = [b + (g - b) / self.held_ticks for b, g in zip(self.bias, self.gyro, strict=True)]
-        wx, wy, wz = (g - b for g, b in zip(self.gyro, self.bias, strict=True))
+        self.omega = wx, wy, wz = [g - b for g, b in zip(self.gyro, self.bias, strict=True)]
         self.yaw_rate = wz
         self.tilt(tick, wx, wy, wz)
         self.rolling(tick, wx, wy)
         state = State()
         state.theta_rad = [*self.theta, self.yaw]
-        state.omega_B_rad_s = [wx, wy, wz]
+        state.omega_B_rad_s = self.omega
         state.phi_rad, state.phi_dot_rad_s = self.phi, self.phi_dot
         return state
 
