@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="tools/requirements-optional.txt")
 from equipoise_tools.benchmark import __main__ as benchmark
-from equipoise_tools.benchmark import peers, runs, score, sensing, tuning
+from equipoise_tools.benchmark import peers, policy, runs, score, sensing, tuning
 
 OTHERS = [name for name, peer in peers.PEERS.items() if peer.make]
 
@@ -71,6 +71,39 @@ def test_the_quaternion_peers_gains_are_the_planes_and_couple_as_it_spins():
     )
     assert still[0, 1] == pytest.approx(0.0, abs=1e-9)
     assert abs(told.solve(12.0)[0, 1]) > 0.05 * abs(still[0, 0])
+
+
+@pytest.mark.parametrize("kind", runs.CONFIGS)
+def test_the_policy_keeps_robots_upright_that_it_was_not_trained_on(kind):
+    for robot in range(901, 905):
+        assert policy.stays_upright(kind, runs.config_path(kind), robot, "mujoco", "built2025")
+
+
+def test_a_policy_is_read_as_it_was_written(tmp_path):
+    net = [(np.full((3, 2), 0.5), np.arange(3.0)), (np.ones((1, 3)), np.zeros(1))]
+    for kind in runs.CONFIGS:
+        policy.write(kind, net, {"seed": 1}, tmp_path / "policy.json")
+    back = policy.read("mbbr", tmp_path / "policy.json")
+    assert [layer.shape for pair in back for layer in pair] == [(3, 2), (3,), (1, 3), (1,)]
+    assert policy.action(back, np.array([1.0, -1.0])) == pytest.approx(min(np.tanh(np.arange(3)).sum(), 1.0))
+
+
+def test_the_trainer_ends_episodes_where_the_environment_does():
+    """A robot that is lost is worth nothing from there; one whose time is over is not lost."""
+    pytest.importorskip("stable_baselines3", reason="tools/requirements-training.txt")
+    from equipoise_tools.benchmark import training
+
+    robots = training.Robots("mip", "nominal", seed=1)
+    robots.reset()
+    ended = []
+    while not robots.over[0].any():
+        _, reward, done, infos = robots.step(np.ones((robots.num_envs, 2)))
+        ended = np.flatnonzero(done)
+    assert all(reward[ended] <= 0.0)
+    assert not any(infos[i]["TimeLimit.truncated"] for i in ended)
+    _, reward, done, infos = robots.step(np.zeros((robots.num_envs, 2)))
+    assert all(done[ended]) and all(reward[ended] == 0.0)
+    assert all(np.array_equal(infos[i]["terminal_observation"], robots.seen[i]) for i in ended)
 
 
 @pytest.mark.parametrize("engine", runs.ENGINES)

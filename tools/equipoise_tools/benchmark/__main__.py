@@ -12,9 +12,10 @@ from pathlib import Path
 from equipoise_robot import _core
 
 from ..campaign import Progress
+from ..campaign_statistics import wilson
 from ..entry import leave
 from ..paths import UserError, repository_root
-from . import picture, runs, score, tuning
+from . import picture, policy, runs, score, tuning
 from .peers import PEERS
 from .workers import Workers
 
@@ -100,6 +101,34 @@ def tune(given: argparse.Namespace) -> None:
                     tuning.write(told, kind, peer, tuning.search(kind, peer, *size, workers.run))
 
 
+def train(given: argparse.Namespace) -> None:
+    from . import training
+
+    for kind in given.kinds:
+        net, minutes = training.train(kind, given.steps, given.seed, given.fidelity)
+        policy.write(kind, net, {"steps": given.steps, "seed": given.seed, "minutes": round(minutes, 1)})
+
+
+def held_out(given: argparse.Namespace) -> None:
+    """The policy in our environment, an episode for each robot."""
+    for kind in given.kinds:
+        for engine in given.engines:
+            lost = []
+            progress = Progress(given.robots, 0)
+            for robot in range(given.first_robot, given.first_robot + given.robots):
+                upright = policy.stays_upright(kind, runs.config_path(kind), robot, engine, given.fidelity)
+                lost += [] if upright else [robot]
+                progress.add([{"fell": not upright}])
+            kept = given.robots - len(lost)
+            low, high = (100 * limit for limit in wilson(kept, given.robots))
+            print(
+                f"policy, {kind}, {engine}, {given.fidelity}, {policy.TICKS} ticks: {kept} of {given.robots} "
+                f"upright ({100 * kept / given.robots:.1f} %, 95 %: {low:.1f} to {high:.1f}), "
+                f"lost: {lost or 'none'}",
+                flush=True,
+            )
+
+
 def arguments(words: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="tools/benchmark", description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, default=200, help="of each type")
@@ -118,8 +147,16 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--tune", action="store_true", help="search each peer's numbers; robots from 851")
     parser.add_argument("--budget", type=int, default=24, help="choices that each search may try")
     parser.add_argument("--training", type=int, default=6, help="robots that each choice is tried on")
+    parser.add_argument("--train", action="store_true", help="the policy anew, by PPO")
+    parser.add_argument(
+        "--steps", type=int, default=3_000_000, help="ticks of all robots that it is trained for"
+    )
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--held-out", action="store_true", help="the policy on robots that it was not trained on"
+    )
     given = parser.parse_args(words)
-    if min(given.robots, given.workers, given.budget, given.training) < 1:
+    if min(given.robots, given.workers, given.budget, given.training, given.steps) < 1:
         parser.error("numbers must be 1 or more")
     last = tuning.FIRST_ROBOT + 50
     if given.training > 50 or not (given.tune or given.first_robot >= last):
@@ -133,6 +170,13 @@ def main(words: list[str] | None = None) -> int:
         if given.tune:
             tune(given)
             print(tuning.FOUND)
+            return 0
+        if given.train:
+            train(given)
+            print(policy.FILE)
+            return 0
+        if given.held_out:
+            held_out(given)
             return 0
         rows = benchmark(given)
         about = {**about_of(given, tuning.found()), "robots": given.robots}
@@ -154,7 +198,8 @@ def main(words: list[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("\ninterrupted; the same command goes on from here", file=sys.stderr)
+        kept = "what was finished is kept" if given.train else "the same command goes on from here"
+        print(f"\ninterrupted; {kept}", file=sys.stderr)
         return 1
     return 0
 

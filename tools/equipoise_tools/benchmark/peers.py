@@ -14,6 +14,7 @@ from scipy.linalg import expm, solve_discrete_are  # type: ignore[import-untyped
 
 from .. import published, tune
 from ..planar_model import STEP_S
+from .policy import Policy
 from .sensing import Known, Senses
 
 MAX_LEAN_RAD = 0.3  # as [controller.*] of the eduMIP
@@ -229,11 +230,11 @@ class Peer:
 
     name: str
     knobs: dict[str, tuple[float, float]] = field(default_factory=dict)
-    make: Callable[[Known, Factors], Feedback] | None = None
+    make: Callable[[Known, Factors], Feedback | Policy] | None = None
 
 
 WIDE = (0.25, 4.0)
-OURS, SHIPPED, DISSERTATION = "ours", "shipped", "dissertation"
+OURS, SHIPPED, DISSERTATION, POLICY = "ours", "shipped", "dissertation", "policy"
 PEERS = {
     peer.name: peer
     for peer in (
@@ -247,6 +248,7 @@ PEERS = {
             dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE),
             Quaternion,
         ),
+        Peer(POLICY, make=Policy),  # trained: nothing to search
         Peer(
             "sliding",
             dict.fromkeys(("slope", "reach", "boundary", "speed", "travel", "filter", "rates", "yaw"), WIDE),
@@ -273,6 +275,8 @@ def choice(peer: Peer, kind: str, config: dict, factors: Factors) -> tuple[str, 
     """Estimator, controller and settings of the firmware."""
     if peer.name in (OURS, SHIPPED):
         return "", "", tune.settings(config, tune.KNOBS[kind], factors) if factors else []
+    if peer.name == POLICY:  # behind the estimator and detector that it was trained with
+        return "", "", []
     if peer.make is not None:
         return (*BESIDE[kind], [*ALONE])
     if kind == "mip":  # its robot's library, on the IMU's own tilt: of [T]'s filters it lasts longest here

@@ -43,7 +43,8 @@ class Known:
             inertia = robot["body_inertia_kg_m2"][2] + p.rotor
             self.yaw_gain = -p.k1 / inertia  # the ball stays, the body turns against the torque
             self.yaw_hold_s = -p.k2 / p.k1
-            self.from_wheels = robot["wheel_radius_m"] / robot["ball_radius_m"] * WHEEL_AXES
+            ratio = robot["ball_radius_m"] / robot["wheel_radius_m"]
+            self.from_wheels, self.u_of_drives = WHEEL_AXES / ratio, ratio * WHEEL_AXES
         else:
             d, r, m = robot["track_m"], robot["wheel_radius_m"], robot["wheel_mass_kg"]
             spin, _, upright = robot["wheel_inertia_kg_m2"]
@@ -51,6 +52,7 @@ class Known:
             self.yaw_gain = d / r * robot["k1_N_m"] / inertia
             self.yaw_hold_s = robot["k2_N_m_s"] / robot["k1_N_m"] * d / (2 * r)
             self.from_wheels = np.array([[0.5, 0.5], [r / d, -r / d]])  # phi, heading
+            self.u_of_drives = np.array([[0.5, 0.5], [0.5, -0.5]])
 
 
 @cache
