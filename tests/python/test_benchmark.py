@@ -13,7 +13,12 @@ pytest.importorskip("mujoco", reason="tools/requirements-optional.txt")
 from equipoise_tools.benchmark import __main__ as benchmark
 from equipoise_tools.benchmark import peers, policy, runs, score, sensing, tuning
 
-OTHERS = [name for name, peer in peers.PEERS.items() if peer.make]
+NO_TINYMPC = pytest.mark.skipif(not peers.available("mpc"), reason="tools/requirements-tinympc.txt")
+OTHERS = [
+    pytest.param(name, marks=NO_TINYMPC) if name == "mpc" else name
+    for name, peer in peers.PEERS.items()
+    if peer.make
+]
 
 
 def lone(peer):
@@ -71,6 +76,19 @@ def test_the_quaternion_peers_gains_are_the_planes_and_couple_as_it_spins():
     )
     assert still[0, 1] == pytest.approx(0.0, abs=1e-9)
     assert abs(told.solve(12.0)[0, 1]) > 0.05 * abs(still[0, 0])
+
+
+@NO_TINYMPC
+def test_the_mpc_is_the_lqr_within_its_limits():
+    wheels = sensing.known(runs.config_path("mip"))
+    told = peers.Predictive(wheels, lone("mpc"))
+    told.restart()
+    a, b = peers.discrete(wheels)
+    p = peers.solve_discrete_are(a, b, peers.weights(lone("lqr")), np.eye(1))
+    k = np.linalg.solve(1 + b.T @ p @ b, b.T @ p @ a)[0]
+    error = np.array([0.01, 0.05, 0.02, 0.1])
+    assert told.axis(0, tuple(error), 0.0) == pytest.approx(k @ a @ error, rel=0.05)
+    assert told.axis(0, (0.3, 0.0, 3.0, 0.0), 0.0) == -peers.MOST_U
 
 
 @pytest.mark.parametrize("kind", runs.CONFIGS)

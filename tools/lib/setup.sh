@@ -134,8 +134,8 @@ install_packages() {
   touch "$root/build/packages.installed"
 }
 
-# install_python FILE: what a requirements file lists, into build/venv. By uv from PyPI, which takes a fifth of pip's time,
-# if pip is set to nothing that uv is not told here; by pip otherwise, or when uv fails.
+# install_python FILE [OPTION...]: what a requirements file lists, into build/venv. By uv from PyPI, in a fifth
+# of pip's time, if pip is set to nothing that uv is not told here; by pip otherwise, or when uv fails.
 install_python() {
   local pip=("$venv_python" -m pip --disable-pip-version-check) line key value known=yes uv=(env)
   local -A settings=()
@@ -154,11 +154,11 @@ install_python() {
     settings[${key##*.}]=$value
   done < <("${pip[@]}" config list)
   if [ "$known" = yes ] && { [ -x "$venv/bin/uv" ] || "${pip[@]}" install --quiet uv==0.13.9 >&2; } &&
-    "${uv[@]}" "$venv_python" -m uv pip install --quiet --no-config --python "$venv_python" -r "$1" >&2; then
+    "${uv[@]}" "$venv_python" -m uv pip install --quiet --no-config --python "$venv_python" "${@:2}" -r "$1" >&2; then
     return 0
   fi
   say "pip installs ${1##*/}, which takes a minute longer than uv"
-  "${pip[@]}" install --quiet -r "$1" >&2
+  "${pip[@]}" install --quiet "${@:2}" -r "$1" >&2
 }
 
 # ensure_venv: a Python environment under build/, remade when the requirements, the Python or the place changed.

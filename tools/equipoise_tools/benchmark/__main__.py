@@ -16,7 +16,7 @@ from ..campaign_statistics import wilson
 from ..entry import leave
 from ..paths import UserError, repository_root
 from . import picture, policy, runs, score, tuning
-from .peers import PEERS
+from .peers import PEERS, available
 from .workers import Workers
 
 KEPT = repository_root() / "docs" / "reports" / "benchmark.json"
@@ -139,7 +139,9 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
         ("points", runs.POINTS),
         ("engines", runs.ENGINES),
     ):
-        parser.add_argument(f"--{name}", nargs="+", choices=list(all_of), default=list(all_of))
+        parser.add_argument(
+            f"--{name}", nargs="+", choices=list(all_of), default=list(filter(available, all_of))
+        )
     parser.add_argument("--fidelity", default="built2025", choices=("built2025", "full", "nominal"))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--out", type=Path, default=repository_root() / "build" / "benchmark")

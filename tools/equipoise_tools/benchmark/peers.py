@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are  # type: ignore[import-untyped]
@@ -224,6 +225,41 @@ class Quaternion(Lqr):
         return w * c - k * s, i * c + j * s, j * c - i * s, k * c + w * s
 
 
+class Predictive(Lqr):
+    """Linear MPC by TinyMPC, an axis at a time: limits on u and tilt for 0.1 s, the LQR's cost after."""
+
+    HORIZON, ROUNDS, RHO = 20, 10, 0.03  # ADMM's, on states scaled to a weight of 1
+
+    def __init__(self, robot: Known, factors: Factors) -> None:
+        self.a, self.b = discrete(robot)
+        self.scale = np.sqrt(np.diag(weights(factors)))
+        super().__init__(robot, factors)
+
+    def restart(self) -> None:
+        super().restart()
+        self.solvers = [self.solver() for _ in range(self.robot.axes)]
+
+    def solver(self):
+        import tinympc  # type: ignore[import-not-found]
+
+        solver, free = tinympc.TinyMPC(), np.full(4, 1e6)
+        a, b = self.a * self.scale[:, None] / self.scale, self.b * self.scale[:, None]
+        # Never asked whether it has converged, which it would print at every tick.
+        rounds = {"max_iter": self.ROUNDS, "check_termination": self.ROUNDS + 1}
+        solver.setup(a, b, np.eye(4), np.eye(1), self.HORIZON, rho=self.RHO, **rounds)
+        free[0] = MAX_LEAN_RAD * self.scale[0]
+        solver.set_bound_constraints(-free, free, np.array([-MOST_U]), np.array([MOST_U]))
+        return solver
+
+    def axis(self, i: int, error: tuple, rate: float) -> float:
+        travel = clamp(error[1], abs(self.k[0] / self.k[1]) * MAX_LEAN_RAD)
+        state = -np.array([error[0], travel, error[2], error[3]])
+        state = self.a @ state + self.b[:, 0] * self.before[i]  # when this u reaches the motors
+        self.solvers[i].set_x0(self.scale * state)
+        self.before[i] = clamp(float(self.solvers[i].solve()["controls"][0]), MOST_U)
+        return self.before[i] + self.robot.hold_s * rate
+
+
 @dataclass(frozen=True)
 class Peer:
     """`knobs`: what the search may scale, and its bounds; `make`: where it is none of the firmware's own."""
@@ -248,6 +284,7 @@ PEERS = {
             dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE),
             Quaternion,
         ),
+        Peer("mpc", dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE), Predictive),
         Peer(POLICY, make=Policy),  # trained: nothing to search
         Peer(
             "sliding",
@@ -256,6 +293,10 @@ PEERS = {
         ),
     )
 }
+
+
+def available(name: str) -> bool:
+    return name != "mpc" or find_spec("tinympc") is not None
 
 
 def knobs_of(peer: Peer, kind: str) -> dict[str, tuple[float, float]]:
