@@ -111,7 +111,7 @@ def test_the_trainer_ends_episodes_where_the_environment_does():
     pytest.importorskip("stable_baselines3", reason="tools/requirements-training.txt")
     from equipoise_tools.benchmark import training
 
-    robots = training.Robots("mip", "nominal", seed=1)
+    robots = training.Robots("mip", "nominal", seed=1, engines=["own"])
     robots.reset()
     ended = []
     while not robots.over[0].any():

@@ -105,8 +105,9 @@ def train(given: argparse.Namespace) -> None:
     from . import training
 
     for kind in given.kinds:
-        net, minutes = training.train(kind, given.steps, given.seed, given.fidelity)
-        policy.write(kind, net, {"steps": given.steps, "seed": given.seed, "minutes": round(minutes, 1)})
+        asked = {name: getattr(given, name) for name in ("steps", "seed", "fidelity", "engines")}
+        net, minutes = training.train(kind, **asked)
+        policy.write(kind, net, {**asked, "minutes": round(minutes, 1)})
 
 
 def held_out(given: argparse.Namespace) -> None:

@@ -37,7 +37,7 @@ class Robots(VecEnv):
     """Groups of robots, a command each, as the learner wants them: a step that only resets is worth
     nothing where the robot was lost, and more of the same where its time was over."""
 
-    def __init__(self, kind: str, fidelity: str, seed: int) -> None:
+    def __init__(self, kind: str, fidelity: str, seed: int, engines: list[str]) -> None:
         self.groups = [
             BalanceVectorEnv(
                 config_path(kind),
@@ -48,8 +48,9 @@ class Robots(VecEnv):
                 fidelity=fidelity,
                 population=ROBOTS,
                 jobs=1,
+                engine=engines[i % len(engines)],
             )
-            for yaw_hz, drive_mps in policy.COMMANDS[kind]
+            for i, (yaw_hz, drive_mps) in enumerate(policy.COMMANDS[kind])
         ]
         one = self.groups[0]
         self.names, self.first_seed = one.observation_names, seed
@@ -125,11 +126,11 @@ class Said(BaseCallback):
             robots.losses, robots.worth = 0, 0.0
 
 
-def train(kind: str, steps: int, seed: int, fidelity: str) -> tuple[policy.Net, float]:
+def train(kind: str, steps: int, seed: int, fidelity: str, engines: list[str]) -> tuple[policy.Net, float]:
     """And minutes that it took."""
     since = time.monotonic()
     torch.set_num_threads(1)
-    robots = Robots(kind, fidelity, seed)
+    robots = Robots(kind, fidelity, seed, engines)
     learner = PPO(
         "MlpPolicy",
         robots,
