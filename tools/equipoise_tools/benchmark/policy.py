@@ -90,8 +90,14 @@ class Policy:
 def stays_upright(kind: str, config: Path, robot: int, engine: str, fidelity: str) -> bool:
     """An episode of one drawn robot."""
     yaw_hz, drive_mps = COMMANDS[kind][robot % len(COMMANDS[kind])]
-    asked = {"yaw_hz": yaw_hz, "drive_mps": drive_mps, "fidelity": fidelity, "engine": engine}
-    env = BalanceEnv(config, population=(robot, robot), **asked)
+    env = BalanceEnv(
+        config,
+        yaw_hz=yaw_hz,
+        drive_mps=drive_mps,
+        fidelity=fidelity,
+        population=(robot, robot),
+        engine=engine,
+    )
     net, scales = read(kind), scale(env.observation_names)
     seen, _ = env.reset(seed=robot)
     for _ in range(TICKS):
