@@ -23,6 +23,7 @@ struct EvidenceParams {
 struct SensorFaultsParams {
   EvidenceParams evidence;
   std::array<bool, 3> balances{};  // gyro axes without which the robot falls
+  double slowly_rad_s = 0.0;       // turning slower it goes on without one that is dead
   Vec3 axis_sign = Vec3::Ones();   // of the sensor's axis along each of the body's
   bool bias_drifts = false;        // is a hypothesis
 

@@ -1,6 +1,6 @@
 // Samples of an IMU that no motion explains: a glitch is not used, nor, when it goes on, the gyro's axes that
-// are off; an axis that repeats its counts while the body turns is dead. In: Measurement, what the gyro
-// should read -> out: what may be used. RT-safe.
+// are off; an axis that repeats its counts while the body turns is dead, and not used. In: Measurement, what
+// the gyro should read -> out: what may be used, and whether the robot can go on. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -14,12 +14,13 @@ namespace equipoise {
 
 class GrossSamples {
  public:
-  /// `balances`: axes of the gyro without which the robot falls.
-  explicit GrossSamples(const std::array<bool, 3>& balances) : balances_(balances) {}
+  /// `balances`: axes of the gyro that balance; `slowly_rad_s`: a robot that turns no faster stands without.
+  GrossSamples(const std::array<bool, 3>& balances, double slowly_rad_s)
+      : balances_(balances), slowly_rad_s_(slowly_rad_s) {}
 
   void reset() noexcept {
     gross_ = frozen_ = 0;
-    trusted_ = true;
+    trusted_ = stands_ = true;
   }
 
   template <int Wheels>
@@ -41,7 +42,9 @@ class GrossSamples {
       frozen = frozen || (z.imu_ok && !raw.gyro_axis_ok[i] && away_rad_s > kTurns_rad_s);
     }
     frozen_ = frozen ? frozen_ + 1 : 0;
-    trusted_ = trusted_ && frozen_ <= kFrozenTicks && !(gross_ > kGlitch && balance_rad_s > kGross_rad_s);
+    stands_ = stands_ && !(frozen && !(std::abs(expected_rad_s.z()) < slowly_rad_s_));
+    trusted_ = trusted_ && (stands_ || frozen_ <= kFrozenTicks) &&
+               !(gross_ > kGlitch && balance_rad_s > kGross_rad_s);
     return z;
   }
 
@@ -57,9 +60,11 @@ class GrossSamples {
   static constexpr int kFrozenTicks = 4;
 
   std::array<bool, 3> balances_;
+  double slowly_rad_s_;
   int gross_ = 0;  // ticks in a row
   int frozen_ = 0;
   bool trusted_ = true;
+  bool stands_ = true;  // it has not turned too fast for an axis that is dead
 };
 
 }  // namespace equipoise

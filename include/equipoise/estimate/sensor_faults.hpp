@@ -34,7 +34,7 @@ class SensorFaults {
   /// `filter`: with the noise that there is, not what margins ask for.
   SensorFaults(const Filter& filter, const SensorFaultsParams& params)
       : p_(params),
-        gross_(params.balances),
+        gross_(params.balances, params.slowly_rad_s),
         weigh_(params.evidence),
         noise_(filter),
         healthy_(with_noise(filter, params)),

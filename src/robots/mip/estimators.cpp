@@ -8,6 +8,7 @@ namespace {
 SensorFaultsParams sensor_faults(const MipEstimatorParams& params) {
   SensorFaultsParams p;
   p.balances = {true, false, false};
+  p.slowly_rad_s = 2.0 * kPi;  // as without any sensor: degraded.hpp
   p.axis_sign = params.gyro_axis_sign;
   p.evidence.encoder_sigma_rad = 0.012;
   p.evidence.encoder_count_rad = 0.003;

@@ -114,7 +114,7 @@ TEST(UsedSensors, AnExcludedSensorMayReturn) {
 }
 
 TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
-  GrossSamples gross({true, true, false});
+  GrossSamples gross({true, true, false}, 0.0);
   const Sample z = at_rest();
   Sample odd = z;
   odd.gyro_B_rad_s.z() += 3.1;
@@ -133,7 +133,7 @@ TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
 }
 
 TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
-  GrossSamples gross({true, false, false});
+  GrossSamples gross({true, false, false}, 2.0 * kPi);
   Mip::Sample z;
   z.imu_ok = true;
   z.accel_B_m_s2.z() = -kGravity_m_s2;
@@ -147,7 +147,7 @@ TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
 }
 
 TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
-  GrossSamples gross({true, true, false});
+  GrossSamples gross({true, true, false}, 0.0);
   Sample z = at_rest();
   z.gyro_axis_ok[1] = false;
   for (int i = 0; i < 10; ++i) gross.without(z, z.gyro_B_rad_s + Vec3(0.0, 0.04, 0.0));
@@ -155,6 +155,28 @@ TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
   for (int i = 0; i < 5; ++i) gross.without(z, z.gyro_B_rad_s + Vec3(0.0, 0.06, 0.0));
   EXPECT_TRUE(gross.left_out());
   EXPECT_FALSE(gross.trusted());
+}
+
+TEST(GrossSamples, ARobotThatStandsWithoutADeadAxisGoesOnUnlessItTurnsFast) {
+  GrossSamples gross({true, false, false}, 2.0 * kPi);
+  Mip::Sample z;
+  z.imu_ok = true;
+  z.accel_B_m_s2.z() = -kGravity_m_s2;
+  z.gyro_axis_ok[0] = false;
+  for (const double turns_rad_s : {0.0, 6.0, -6.0}) {
+    z.gyro_B_rad_s.z() = turns_rad_s;
+    for (int i = 0; i < 10; ++i) EXPECT_FALSE(gross.without(z, {0.06, 0.0, turns_rad_s}).gyro_axis_ok[0]);
+    EXPECT_TRUE(gross.left_out()) << "it goes slowly";
+    EXPECT_TRUE(gross.trusted());
+  }
+  z.gyro_B_rad_s.z() = -6.5;
+  gross.without(z, {0.06, 0.0, -6.5});
+  z.gyro_B_rad_s.z() = 0.0;
+  gross.without(z, {0.06, 0.0, 0.0});
+  EXPECT_FALSE(gross.trusted()) << "its tilt has gone astray while it turned";
+  gross.reset();
+  gross.without(z, {0.06, 0.0, 0.0});
+  EXPECT_TRUE(gross.trusted());
 }
 
 class Standing : public testing::Test {
