@@ -165,12 +165,11 @@ class Evidence {
   double spread(const Filter& f, std::size_t row) const noexcept {
     return kModelError * kModelError * std::max(f.row_variance()[row], row < 3 ? vibration_ : 0.0);
   }
-  /// What jumps of the gyro, of one `sigma_rad_s`, would explain of this tick's innovations of `axes`; nats.
-  double jump(const Filter& f, const Sample& used, const std::array<bool, 3>& axes,
-              double sigma_rad_s) const noexcept {
+  /// What jumps of the gyro, of one `sigma_rad_s`, would explain of this tick's innovations; nats.
+  double jump(const Filter& f, const Sample& used, double sigma_rad_s) const noexcept {
     double sum = 0.0;
     for (std::size_t row = 0; row < 3; ++row) {
-      if (!axes[row] || !comes(used, row)) continue;
+      if (!comes(used, row)) continue;
       const double v = spread(f, row);
       sum += log_normal(squared(f, row), v + sigma_rad_s * sigma_rad_s) -
              std::max(log_normal(squared(f, row), v), shaken_[row]);

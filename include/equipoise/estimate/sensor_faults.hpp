@@ -117,7 +117,6 @@ class SensorFaults {
   static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
-  static constexpr int kShownTicks = 200;   // a bias that jumps has moved the tilt by 0.1 rad
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
   static constexpr int kRocking = 400;      // no body rocks for longer
   static constexpr double kJump_rad_s = 0.3;
@@ -191,12 +190,9 @@ class SensorFaults {
     Member& m = members_[i];
     if (h.kind == FaultHypothesis::kBias &&
         Evidence::off_rad_s(healthy_, all, p_.balances) > weigh_.least_jump_rad_s()) {
-      // A jump of the gyro's bias (Willsky and Jones 1976)? What it follows already is no new one, unless the
-      // axes that balance say so.
-      const double three = weigh_.jump(healthy_, all, {true, true, true}, kJump_rad_s);
-      const bool anew = m.ratio <= -kMargin ||
-                        weigh_.jump(healthy_, all, p_.balances, kJump_rad_s) > std::max(m.ratio, 0.0);
-      if (anew && three > -kMargin) return jumped(i, u, z, three);
+      // A jump of the gyro's bias (Willsky and Jones 1976)? What it follows already is no new one.
+      const double nats = weigh_.jump(healthy_, all, kJump_rad_s);
+      if (m.ratio <= -kMargin && nats > -kMargin) return jumped(i, u, z, nats);
     }
     const bool anew = m.ratio <= -kMargin || is_over(i);
     if (h.waits() && anew) return m.refute(-kMargin);
@@ -281,13 +277,10 @@ class SensorFaults {
     }
     return true;
   }
-  /// A push or slip is; so is a fault by which the robot would have all but fallen, had it been one.
+  /// A push or slip is, soon.
   bool is_over(std::size_t i) const noexcept {
     const FaultHypothesis& h = kHypotheses[i];
-    const int age = ticks_ - members_[i].since;
-    if (h.healthy()) return h.kind != FaultHypothesis::kEvent && age > kEventTicks;
-    if (age <= kShownTicks || weighed(i) > kBound) return false;
-    return h.kind == FaultHypothesis::kBias || (h.kind == FaultHypothesis::kSwap && p_.balance(h.mask));
+    return h.healthy() && h.kind != FaultHypothesis::kEvent && ticks_ - members_[i].since > kEventTicks;
   }
   bool open(const FaultHypothesis& h) const noexcept {
     return used_.leaves_open(h) && (p_.bias_drifts || h.kind != FaultHypothesis::kDrift);
@@ -327,10 +320,7 @@ class SensorFaults {
       return;
     }
     if (leads == kNone) return happened(best, control);
-    // One encoder or two? What holds for two had better not be taken for one.
-    const bool nested = kHypotheses[best].kind <= FaultHypothesis::kWheels &&
-                        kHypotheses[runner_up].kind == FaultHypothesis::kWheels;
-    if (weight[best] - second < (nested ? 2.0 : 1.0) * kMargin) {
+    if (weight[best] - second < kMargin) {
       if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) stop(best, runner_up);
       return;
     }

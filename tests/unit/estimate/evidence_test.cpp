@@ -216,7 +216,7 @@ TEST(Evidence, ASpikeIsNoJump) {
   filter.variance.fill(1e-6);
   const Sample z = at_rest();
   evidence.expect(filter, z, z);
-  const auto says = [&] { return evidence.jump(filter, z, {true, false, false}, 0.3); };
+  const auto says = [&] { return evidence.jump(filter, z, 0.3); };
   filter.innovation[0] = 0.6;  // six sigma: one sample in twenty is an outlier
   EXPECT_GT(says(), 0.0);
   EXPECT_LT(says(), 4.0);
