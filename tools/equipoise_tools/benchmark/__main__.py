@@ -186,7 +186,7 @@ def main(words: list[str] | None = None) -> int:
         exact = json.dumps(score.scores(rows))
         told = json.loads(exact, parse_float=lambda number: round(float(number), 4))
         path = given.out / "scores.json"
-        lines = ",\n".join(json.dumps(row) for row in told)
+        lines = ",\n".join(json.dumps(row, separators=(",", ":")) for row in told)
         kept = f'{{"about": {json.dumps(about)}, "scores": [\n{lines}\n]}}\n'
         page = score.page(told, about)
         path.write_text(kept)
