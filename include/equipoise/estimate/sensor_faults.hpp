@@ -117,6 +117,7 @@ class SensorFaults {
   static constexpr double kEventPrior = 9.0;
   static constexpr int kPatience = 20;      // ticks for one verdict to lead; a tilt grows by half in them
   static constexpr int kEventTicks = 20;    // a push or slip is over: what goes on slowly is none
+  static constexpr int kShownTicks = 200;   // a bias that jumps has moved the tilt by 0.1 rad
   static constexpr int kArmingTicks = 100;  // a push of the hand that lets go is over
   static constexpr int kRocking = 400;      // no body rocks for longer
   static constexpr double kJump_rad_s = 0.3;
@@ -277,10 +278,13 @@ class SensorFaults {
     }
     return true;
   }
-  /// A push or slip is, soon.
+  /// A push or slip is; so is a fault by which the robot would have all but fallen, had it been one.
   bool is_over(std::size_t i) const noexcept {
     const FaultHypothesis& h = kHypotheses[i];
-    return h.healthy() && h.kind != FaultHypothesis::kEvent && ticks_ - members_[i].since > kEventTicks;
+    const int age = ticks_ - members_[i].since;
+    if (h.healthy()) return h.kind != FaultHypothesis::kEvent && age > kEventTicks;
+    if (age <= kShownTicks || weighed(i) > kBound) return false;
+    return h.kind == FaultHypothesis::kBias || (h.kind == FaultHypothesis::kSwap && p_.balance(h.mask));
   }
   bool open(const FaultHypothesis& h) const noexcept {
     return used_.leaves_open(h) && (p_.bias_drifts || h.kind != FaultHypothesis::kDrift);
