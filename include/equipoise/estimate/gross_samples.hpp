@@ -42,7 +42,7 @@ class GrossSamples {
       frozen = frozen || (z.imu_ok && !raw.gyro_axis_ok[i] && away_rad_s > kTurns_rad_s);
     }
     frozen_ = frozen ? frozen_ + 1 : 0;
-    stands_ = stands_ && !(frozen && !(std::abs(expected_rad_s.z()) < slowly_rad_s_));
+    if (frozen && !(std::abs(expected_rad_s.z()) < slowly_rad_s_)) stands_ = false;
     trusted_ = trusted_ && (stands_ || frozen_ <= kFrozenTicks) &&
                !(gross_ > kGlitch && balance_rad_s > kGross_rad_s);
     return z;
