@@ -57,6 +57,7 @@ def about_of(given: argparse.Namespace, told: dict) -> dict:
         "version": _core.version(),
         "configurations_sha256": hashlib.sha256(shipped).hexdigest(),
         "tuned_sha256": hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest(),
+        "policy_sha256": hashlib.sha256(policy.FILE.read_bytes()).hexdigest(),
         "fidelity": given.fidelity,
         "first_robot": given.first_robot,
     }
