@@ -125,6 +125,26 @@ class Lqr(Feedback):
         return feedback + self.robot.hold_s * rate
 
 
+Quat = tuple[float, float, float, float]  # w, x, y, z
+
+
+def tilted(x: float, y: float) -> Quat:
+    """Ry Rx."""
+    cx, sx, cy, sy = math.cos(x / 2), math.sin(x / 2), math.cos(y / 2), math.sin(y / 2)
+    return cy * cx, cy * sx, sy * cx, -sy * sx
+
+
+def between(there: Quat, wanted: Quat) -> Quat:
+    """conj(there) * wanted."""
+    (w, x, y, z), (a, b, c, d) = there, wanted
+    return (
+        w * a + x * b + y * c + z * d,
+        w * b - x * a - y * d + z * c,
+        w * c + x * d - y * a - z * b,
+        w * d - x * c + y * b - z * a,
+    )
+
+
 class Sliding(Lqr):
     """Sliding mode of the attitude's quaternion error about a reference that an LQR of the travel sets, after
     Kugle's papers; one tilt at a time is its plane."""
@@ -145,16 +165,9 @@ class Sliding(Lqr):
 
     @staticmethod
     def vector(wanted: list[float], there: list[float]) -> list[float]:
-        """Twice the vector part of conj(there) * wanted, both Ry Rx."""
-
-        def quaternion(angles: list[float]) -> tuple[float, float, float, float]:
-            x, y = angles[0] / 2, (angles[1] if len(angles) > 1 else 0.0) / 2
-            cx, sx, cy, sy = math.cos(x), math.sin(x), math.cos(y), math.sin(y)
-            return cy * cx, cy * sx, sy * cx, -sy * sx
-
-        w, x, y, z = quaternion(there)
-        a, b, c, d = quaternion(wanted)
-        return [2 * (w * b - x * a - y * d + z * c), 2 * (w * c + x * d - y * a - z * b)]
+        """Twice the tilts of the vector part from one attitude to the other."""
+        _, x, y, _ = between(tilted(*[*there, 0.0][:2]), tilted(*[*wanted, 0.0][:2]))
+        return [2 * x, 2 * y]
 
     def axis(self, i: int, error: tuple, rate: float) -> float:
         surface = error[2] + self.slope * self.off[i]
@@ -217,12 +230,9 @@ class Quaternion(Lqr):
         return [a + b for a, b in zip(self.before, held, strict=True)]
 
     @staticmethod
-    def error(x: float, y: float, heading: float) -> tuple[float, float, float, float]:
-        """conj(there) * wanted: there Ry Rx, wanted Rz of the heading's error."""
-        cx, sx, cy, sy = math.cos(x / 2), math.sin(x / 2), math.cos(y / 2), math.sin(y / 2)
-        c, s = math.cos(heading / 2), math.sin(heading / 2)
-        w, i, j, k = cy * cx, -cy * sx, -sy * cx, sy * sx
-        return w * c - k * s, i * c + j * s, j * c - i * s, k * c + w * s
+    def error(x: float, y: float, heading: float) -> Quat:
+        """From there to upright, turned by the heading's error."""
+        return between(tilted(x, y), (math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)))
 
 
 class Predictive(Lqr):
@@ -270,6 +280,7 @@ class Peer:
 
 
 WIDE = (0.25, 4.0)
+OF_LQR = dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE)
 OURS, SHIPPED, DISSERTATION, POLICY = "ours", "shipped", "dissertation", "policy"
 PEERS = {
     peer.name: peer
@@ -278,13 +289,9 @@ PEERS = {
         Peer(SHIPPED),  # ours before the search
         Peer(DISSERTATION),  # as published: nothing to search
         Peer("pid", dict.fromkeys(("P", "I", "D", "speed", "travel", "yaw"), WIDE), CascadePid),
-        Peer("lqr", dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE), Lqr),
-        Peer(
-            "quaternion",
-            dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE),
-            Quaternion,
-        ),
-        Peer("mpc", dict.fromkeys(("tilt", "travel", "speed", "filter", "rates", "yaw"), WIDE), Predictive),
+        Peer("lqr", OF_LQR, Lqr),
+        Peer("quaternion", OF_LQR, Quaternion),
+        Peer("mpc", OF_LQR, Predictive),
         Peer(POLICY, make=Policy),  # trained: nothing to search
         Peer(
             "sliding",

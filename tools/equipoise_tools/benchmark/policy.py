@@ -72,7 +72,9 @@ def action(net: Net, seen: np.ndarray) -> np.ndarray:
 
 
 class Policy:
-    """As a peer: no estimator of its own."""
+    """As a peer."""
+
+    senses = None  # our estimator's
 
     def __init__(self, robot: Known, factors: dict[str, float]) -> None:
         self.axes = robot.axes

@@ -105,7 +105,7 @@ def run(trial: Trial, fidelity: str, factors: Factors) -> dict:
     make_peer = PEERS[trial.peer].make
     if make_peer is not None:
         controller = make_peer(known(config_path(trial.kind)), factors)
-        estimator = getattr(controller, "senses", None)  # None: ours
+        estimator = controller.senses
 
     def make(dimensions: str, inputs: np.ndarray, outputs: np.ndarray):
         engine = Engine(models.mjcf(trial.kind, json.loads(dimensions)), inputs, outputs)
