@@ -21,16 +21,26 @@ class Engine:
             exact = self.model.numeric(i)
             self.model.body(exact.name.removeprefix("inertia_")).inertia[:] = exact.data
         self.mujoco.mj_setConst(self.model, self.data)
-        self.body = self.model.body("robot").id
+        data, body = self.data, self.model.body
         self.torque, self.push, self.drag = inputs[:3], inputs[3:5], inputs[5:7]
         self.R_WB, self.gyro, self.force = outputs[:9], outputs[9:12], outputs[12:15]
         self.joint_rate, self.position, self.velocity = outputs[15:18], outputs[18:21], outputs[21:24]
-        self.pushed = self.data.xfrc_applied[self.body][:2]
-        self.accelerometer = self.data.sensor("accel").data
         self.has_ball = self.model.nq == 11
-        rolling = [self.model.body(name).id for name in (["ball"] if self.has_ball else ["right", "left"])]
-        self.dragged = [self.data.xfrc_applied[body][:2] for body in rolling]
-        self.back = np.zeros(4)
+        # Views, made once: each costs as much as what is done with it.
+        self.attitude, self.ball, self.ball_rate = data.qpos[3:7], data.qpos[7:11], data.qvel[6:9]
+        self.applied, self.back = data.qfrc_applied[6:9], np.zeros(4)
+        self.pushed = data.xfrc_applied[body("robot").id][:2]
+        rolling = [body(name).id for name in (["ball"] if self.has_ball else ["right", "left"])]
+        self.dragged, self.share = data.xfrc_applied[rolling[0] : rolling[-1] + 1, :2], 1.0 / len(rolling)
+        self.seen = [
+            (self.gyro, data.qvel[3:6]),
+            (self.force, data.sensor("accel").data),
+            (self.position, data.qpos[:3]),
+            (self.velocity, data.qvel[:3]),
+        ]
+        if not self.has_ball:
+            self.torque, self.applied = self.torque[:2], self.applied[:2]
+            self.seen.append((self.joint_rate[:2], data.qvel[6:8]))
 
     def start(self) -> None:
         """At the attitude `R_WB`; a robot on two wheels turned about its y until both are on the floor."""
@@ -46,26 +56,20 @@ class Engine:
         self.read()
 
     def step(self) -> None:
-        data, lib = self.data, self.mujoco
+        lib = self.mujoco
         if self.has_ball:  # the engine has the joint in the ball's own axes
-            lib.mju_negQuat(self.back, data.qpos[7:11])
-            lib.mju_rotVecQuat(data.qfrc_applied[6:9], self.torque, self.back)
+            lib.mju_negQuat(self.back, self.ball)
+            lib.mju_rotVecQuat(self.applied, self.torque, self.back)
         else:
-            data.qfrc_applied[6:8] = self.torque[:2]
+            self.applied[:] = self.torque
         self.pushed[:] = self.push
-        for force in self.dragged:
-            force[:] = self.drag / len(self.dragged)
-        lib.mj_step(self.model, data)
+        np.multiply(self.drag, self.share, out=self.dragged)
+        lib.mj_step(self.model, self.data)
         self.read()
 
     def read(self) -> None:
-        data, lib = self.data, self.mujoco
-        lib.mju_quat2Mat(self.R_WB, data.qpos[3:7])
-        self.gyro[:] = data.qvel[3:6]
-        self.force[:] = self.accelerometer
+        self.mujoco.mju_quat2Mat(self.R_WB, self.attitude)
         if self.has_ball:
-            lib.mju_rotVecQuat(self.joint_rate, data.qvel[6:9], data.qpos[7:11])
-        else:
-            self.joint_rate[:2] = data.qvel[6:8]
-        self.position[:] = data.qpos[:3]
-        self.velocity[:] = data.qvel[:3]
+            self.mujoco.mju_rotVecQuat(self.joint_rate, self.ball_rate, self.ball)
+        for seen, there in self.seen:
+            seen[:] = there
