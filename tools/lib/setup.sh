@@ -9,6 +9,7 @@ venv_python=$venv/bin/python
 # The compiler's cache serves every build folder of a tree: the wheel's has what build/host compiled.
 export CCACHE_NOHASHDIR=1
 export CCACHE_SLOPPINESS=pch_defines,time_macros,locale # or nothing that includes a precompiled header is kept
+export OPENBLAS_NUM_THREADS=1 # workers take a core each; its threads beside them would only spin
 export MPLCONFIGDIR=$root/build/matplotlib # the font list of another environment on this machine is not ours
 jobs=$(nproc)
 
