@@ -63,9 +63,11 @@ class Feedback:
         self.was_held = True
 
     def __call__(self, tick) -> list[float]:
-        if self.senses.held or self.was_held:
+        was_held, self.was_held = self.was_held, self.senses.held
+        if self.was_held:
+            return [0.0] * (self.robot.axes + 1)
+        if was_held:
             self.restart()
-        self.was_held = self.senses.held
         return self.drive(tick)
 
     def drive(self, tick) -> list[float]:
