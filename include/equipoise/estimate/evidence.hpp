@@ -103,8 +103,8 @@ class Evidence {
   /// expect()'s filter has lost its way, or its variances were widened: most() does not hold for those of
   /// before.
   bool knows_less() const noexcept { return knows_less_; }
-  /// What it loses by wheels that are off by less than a standard deviation, as an eduMIP's are for long
-  /// where the floor slopes: one that falls is off by more.
+  /// What it loses by wheels that are off by less than a standard deviation. An eduMIP's are for long, where
+  /// it turns or the floor slopes: tick by tick that says the same again, and nothing of the IMU.
   double within_a_sigma() const noexcept { return within_; }
   /// What a filter could say of this tick at most that uses some rows of `all`, and so is surer of none: it
   /// need not run to be refuted.

@@ -37,6 +37,7 @@ struct FaultHypothesis {
     return i;
   }
   constexpr bool healthy() const noexcept { return kind >= kSpin; }
+  constexpr bool of_imu() const noexcept { return kind >= kAxis && !healthy(); }
   constexpr bool pushes() const noexcept { return kind == kPush || kind == kRock; }
   constexpr bool waits() const noexcept { return kind == kBias || kind == kEvent; }  // to be begun
   constexpr bool leaves_out() const noexcept {

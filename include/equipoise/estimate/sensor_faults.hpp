@@ -213,7 +213,7 @@ class SensorFaults {
     const Sample used = m.used.of(z);
     m.innovate(used);
     double gain = weigh_(m.filter, used, z) - as_used;
-    if (kRocks && h.kind == FaultHypothesis::kSwap) gain -= weigh_.within_a_sigma();
+    if (kRocks && h.of_imu()) gain -= weigh_.within_a_sigma();
     if (m.returns >= 0) gain = std::min(gain, weigh_.unless_faulty(m.filter, used, z, m.returns, m.from));
     // A fault beside which a wheel still has to slip explains nothing; only swapped axes make a robot slip.
     const bool explains = h.healthy() || h.kind == FaultHypothesis::kSwap || !m.filter.slipped();
@@ -343,11 +343,11 @@ class SensorFaults {
   }
 
   /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
-  /// The control's filter takes a push by itself, one on three wheels a slip, too: it lets go of wheels that
-  /// slip far (encoder_slip.hpp). Of noisier samples it has heard only since that led.
+  /// The control's filter takes pushes and slips by itself: it lets go of wheels that slip far
+  /// (encoder_slip.hpp). Of noisier samples one on three wheels has heard only since that led.
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].settled());
-    if (kRocks ? !kHypotheses[event].pushes() : event == kNoise) control.adopt(healthy_);
+    if (!kRocks && event == kNoise) control.adopt(healthy_);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.depart(ratio, -kMargin);
     begin(event, healthy_, healthy_);
