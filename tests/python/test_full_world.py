@@ -113,6 +113,23 @@ def test_a_slope_speaks_for_no_swapped_axes():
     assert [row["ended"] for row in run_trials("config/edumip.toml", asked)] == ["finished"] * 3
 
 
+def test_wheels_off_by_a_little_speak_for_no_jump_of_the_bias():
+    """Each tick's third of a nat was counted again for seconds: all of these lost their gyro's bias."""
+    runs = (2984, 0.5), (2984, 1.0), (2986, 2.0), (2994, 1.0), (2994, 2.0), (3003, 0.5)
+    common = {"duration_s": 12.0, "fidelity": "full"}
+    asked = [
+        {
+            "robot": robot,
+            "seed": robot,
+            "yaw_hz": yaw_hz,
+            "drive_mps": 0.3 if yaw_hz == 0.5 else 0.2,
+            **common,
+        }
+        for robot, yaw_hz in runs
+    ]
+    assert [row["verdicts"] for row in run_trials("config/edumip.toml", asked)] == [[]] * len(runs)
+
+
 def test_a_bias_that_jumps_takes_gyro_y_with_it(root):
     """y does not tell of it, but what it reads since would be taken for a robot that rolls on and on."""
     command = [
