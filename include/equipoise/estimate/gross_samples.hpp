@@ -32,11 +32,13 @@ class GrossSamples {
     const bool gross = z.imu_ok && !(explained.norm() < kGross_rad_s && z.accel_B_m_s2.norm() < kGross_m_s2);
     gross_ = gross ? gross_ + 1 : 0;
     if (gross && gross_ <= kGlitch) z.imu_ok = false;
-    bool frozen = false;
+    bool frozen = off_ = false;
     double balance_rad_s = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
       const double away_rad_s = std::abs(away(static_cast<int>(i)));
-      z.gyro_axis_ok[i] = z.gyro_axis_ok[i] && away_rad_s < kGross_rad_s;
+      const bool off = !(away_rad_s < kGross_rad_s);
+      off_ = off_ || off;
+      z.gyro_axis_ok[i] = z.gyro_axis_ok[i] && !off;
       if (!balances_[i]) continue;
       balance_rad_s = std::max(balance_rad_s, away_rad_s);
       frozen = frozen || (z.imu_ok && !raw.gyro_axis_ok[i] && away_rad_s > kTurns_rad_s);
@@ -50,7 +52,7 @@ class GrossSamples {
 
   bool trusted() const noexcept { return trusted_; }
   /// An axis is not used, and for longer than a glitch.
-  bool left_out() const noexcept { return frozen_ >= kFrozenTicks || gross_ > kGlitch; }
+  bool left_out() const noexcept { return frozen_ >= kFrozenTicks || (off_ && gross_ > kGlitch); }
 
  private:
   static constexpr double kGross_rad_s = 3.0;  // between two samples: 600 rad/s2
@@ -63,6 +65,7 @@ class GrossSamples {
   double slowly_rad_s_;
   int gross_ = 0;  // ticks in a row
   int frozen_ = 0;
+  bool off_ = false;  // an axis of the gyro
   bool trusted_ = true;
   bool stands_ = true;  // it has not turned too fast for an axis that is dead
 };

@@ -50,6 +50,16 @@ TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
   }
 }
 
+TEST(GrossSamples, ABlowLeavesOutNoAxisOfTheGyro) {
+  GrossSamples gross({true, false, false}, 2.0 * kPi);
+  Mip::Sample z;
+  z.imu_ok = true;
+  z.accel_B_m_s2.z() = -6.0 * kGravity_m_s2;
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(gross.without(z, Vec3::Zero()).imu_ok, i >= 3);
+  EXPECT_FALSE(gross.left_out());
+  EXPECT_TRUE(gross.trusted());
+}
+
 TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
   GrossSamples gross({true, true, false}, 0.0);
   Mbbr::Sample z = at_rest();
