@@ -181,6 +181,8 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
 
   SafetyInputs checks(const Result& t, const Command& asked, std::uint32_t inhibit) const noexcept {
     SafetyInputs in = safety_inputs(t.z, view(t.x_hat, p_.robot), encoder_check_, asked);
+    const Wheels turn = kinematics_.wheels_of_turn(in.state.omega_B_rad_s.z());
+    for (int i = 0; i < Robot::kWheels; ++i) in.turn_rad_s[static_cast<std::size_t>(i)] = turn(i);
     in.encoders_reversed |= health_.backwards;
     in.encoders_stuck |= health_.dead;
     if (encoder_probe_.dead()) in.encoders_stuck |= (1U << Robot::kWheels) - 1U;

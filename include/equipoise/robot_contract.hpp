@@ -45,6 +45,8 @@ struct RobotContract {
                 "Kinematics::wheels_from_axes maps inputs to wheels");
   static_assert(std::is_same_v<decltype(kinematics().axes_from_wheels(wheels())), Input>,
                 "Kinematics::axes_from_wheels maps wheels to inputs");
+  static_assert(std::is_same_v<decltype(kinematics().wheels_of_turn(0.0)), Wheels>,
+                "Kinematics::wheels_of_turn has the wheels' rates while the robot turns");
   static_assert(std::is_same_v<decltype(estimators().update(sample(), u(), bool())), const Estimate&>,
                 "Estimators::update(sample, input, held) returns the controlling estimate");
   static_assert(noexcept(estimators().update(sample(), u(), bool())), "the tick does not throw");

@@ -80,9 +80,9 @@ std::uint32_t Safety::check_motion(const SafetyInputs& in) noexcept {
   const int patience = left_out_ != 0 ? kLeftOutTicks : ticks(p_.max_innovation_s);
   unhealthy_ = surprised_ > (unhealthy_ ? 0 : patience);
   falling_ = count(falling_, !(in.imu_ok && in.accel_m_s2 < kFreeFall_m_s2));
-  const double fastest =
-      std::abs(*std::max_element(in.wheel_rate_rad_s.begin(), in.wheel_rate_rad_s.end(),
-                                 [](double a, double b) { return std::abs(a) < std::abs(b); }));
+  double fastest = 0.0;
+  for (std::size_t i = 0; i < kMaxMotors; ++i)
+    fastest = std::max(fastest, std::abs(in.wheel_rate_rad_s[i] - in.turn_rad_s[i]));
   fast_ = count(fast_, !(fastest > p_.max_wheel_rate_rad_s));
 
   std::uint32_t reasons = 0;

@@ -80,6 +80,11 @@ const Fault kFaults[] = {
        in.encoders_reversed = 4;
      }},
     {"picked_up", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.wheel_rate_rad_s[2] = -95.0; }},
+    {"picked_up_turning", kPickedUp, 10,
+     [](SafetyInputs& in, MotorCommand&) {
+       in.wheel_rate_rad_s[2] = -75.0;
+       in.turn_rad_s[2] = 20.0;
+     }},
     {"dropped", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.accel_m_s2 = 0.5; }},
     {"saturated", kSaturated, 101, [](SafetyInputs& in, MotorCommand&) { in.saturated = true; }},
     {"bridge", kBridgeFault, 3, [](SafetyInputs& in, MotorCommand&) { in.bridge_fault = true; }},

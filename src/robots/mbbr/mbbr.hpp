@@ -53,6 +53,10 @@ class MbbrKinematics {
     return (1.0 / ratio_) * (T_ob_inverse_.transpose() * wheels);
   }
   Vec3 wheels_from_ball(const Vec3& ball_B) const noexcept { return ratio_ * (T_ob_.transpose() * ball_B); }
+  /// Rates while the robot turns on a ball that does not.
+  Vec3 wheels_of_turn(double yaw_rate_rad_s) const noexcept {
+    return wheels_from_ball(Vec3(0.0, 0.0, -yaw_rate_rad_s));
+  }
   /// Friction acts about the body axes, [T] section 5.3.
   template <class Compensation>
   Vec3 friction_input(const Compensation& c, const Vec3& wheel_rates) const noexcept {

@@ -61,6 +61,8 @@ class MipKinematics {
   Wheels wheels(double phi, double psi) const noexcept {
     return {phi + yaw_to_wheel_ * psi, phi - yaw_to_wheel_ * psi};
   }
+  /// Their rates while the robot turns on the spot.
+  Wheels wheels_of_turn(double yaw_rate_rad_s) const noexcept { return wheels(0.0, yaw_rate_rad_s); }
 
  private:
   double yaw_to_wheel_;

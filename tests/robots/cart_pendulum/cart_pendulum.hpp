@@ -24,6 +24,7 @@ class CartPendulumKinematics {
  public:
   explicit CartPendulumKinematics(const CartPendulumParameters& /*p*/) noexcept {}
   Vec<4> wheels_from_axes(const Vec<1>& u) const noexcept { return Vec<4>::Constant(u(0)); }
+  Vec<4> wheels_of_turn(double /*yaw_rate_rad_s*/) const noexcept { return Vec<4>::Zero(); }
   Vec<4> allocate(const Vec<1>& u, double limit) const noexcept {
     return wheels_from_axes(u).cwiseMax(-limit).cwiseMin(limit);
   }

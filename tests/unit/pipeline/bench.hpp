@@ -17,6 +17,7 @@ class Kinematics {
   explicit Kinematics(const Parameters& /*p*/) noexcept {}
   Vec<2> wheels_from_axes(const Vec<2>& u) const noexcept { return {u(0) + u(1), u(0) - u(1)}; }
   Vec<2> axes_from_wheels(const Vec<2>& w) const noexcept { return {(w(0) + w(1)) / 2, (w(0) - w(1)) / 2}; }
+  Vec<2> wheels_of_turn(double yaw_rate_rad_s) const noexcept { return {yaw_rate_rad_s, -yaw_rate_rad_s}; }
   /// The first input goes first.
   Vec<2> allocate(const Vec<2>& u, double limit) const noexcept {
     return Vec<2>::Constant(std::clamp(u(0), -limit, limit));
