@@ -113,6 +113,13 @@ def test_a_slope_speaks_for_no_swapped_axes():
     assert [row["ended"] for row in run_trials("config/edumip.toml", asked)] == ["finished"] * 3
 
 
+def test_an_edumip_that_turns_fast_is_not_picked_up():
+    """Half of a wheel's speed is the turn's: nine of sixty were switched off for it and would have stood."""
+    common = {"yaw_hz": 3.0, "drive_mps": 0.2, "duration_s": 20.0, "fidelity": "full"}
+    asked = [{"robot": robot, "seed": robot, **common} for robot in (3061, 3076, 3081, 3087, 3097, 3102)]
+    assert [row["reasons"] for row in run_trials("config/edumip.toml", asked)] == [[]] * len(asked)
+
+
 def test_wheels_off_by_a_little_speak_for_no_jump_of_the_bias():
     """Each tick's third of a nat was counted again for seconds: all of these lost their gyro's bias."""
     runs = (2984, 0.5), (2984, 1.0), (2986, 2.0), (2994, 1.0), (2994, 2.0), (3003, 0.5)

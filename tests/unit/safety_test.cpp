@@ -240,6 +240,8 @@ TEST(Safety, ItsLimitsThemselvesAreAllowed) {
   in.motor_error = p.max_motor_error;
   in.battery_V = p.min_battery_V;
   in.wheel_rate_rad_s[1] = p.max_wheel_rate_rad_s;
+  in.wheel_rate_rad_s[2] = p.max_wheel_rate_rad_s + 50.0;
+  in.turn_rad_s[2] = 50.0;  // as it turns on the spot
   Safety safety(p);
   for (int i = 0; i < 1000; ++i) ASSERT_TRUE(safety.gate(half(), in).enable) << safety.reasons();
 }

@@ -38,6 +38,7 @@ TEST(MbbrKinematics, WheelsAndAxesAreInverse) {
   const Vec3 u(0.3, -0.7, 0.2);
   EXPECT_LT((k.axes_from_wheels(k.wheels_from_axes(u)) - u).norm(), 1e-14);
   EXPECT_LT((k.ball_from_wheels(k.wheels_from_ball(u)) - u).norm(), 1e-14);
+  EXPECT_LT((k.ball_from_wheels(k.wheels_of_turn(3.0)) - Vec3(0.0, 0.0, -3.0)).norm(), 1e-14);
   // |u| reaches r/r_w = 2.56 with all wheels at full duty, [T] (5.14)
   EXPECT_NEAR(k.axes_from_wheels(Vec3::Unit(0)).norm(), 0.032 / 0.0125, 1e-12);
 }

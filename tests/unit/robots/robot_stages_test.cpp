@@ -122,6 +122,8 @@ TEST(MipKinematics, EncodersGiveMeanAngleAndYaw) {
   EXPECT_NEAR(k.phi(wheels), 1.5, 1e-12);
   EXPECT_NEAR(k.psi(wheels), 0.4, 1e-12);
   EXPECT_NEAR(wheels.x() - wheels.y(), 0.4 * p.d / p.r, 1e-12);  // [T] (3.18)
+  EXPECT_NEAR(k.phi(k.wheels_of_turn(3.0)), 0.0, 1e-12);
+  EXPECT_NEAR(k.psi(k.wheels_of_turn(3.0)), 3.0, 1e-12);
 }
 
 }  // namespace
