@@ -344,10 +344,10 @@ class SensorFaults {
 
   /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
   /// The control's filter takes pushes and slips by itself: it lets go of wheels that slip far
-  /// (encoder_slip.hpp). Of noisier samples one on three wheels has heard only since that led.
+  /// (encoder_slip.hpp). Of noisier samples it has heard only since that led.
   void happened(std::size_t event, Filter& control) noexcept {
     healthy_.adopt(members_[event].settled());
-    if (!kRocks && event == kNoise) control.adopt(healthy_);
+    if (event == kNoise) control.adopt(healthy_);
     const double ratio = members_[event].ratio;
     for (Member& m : members_) m.depart(ratio, -kMargin);
     begin(event, healthy_, healthy_);
