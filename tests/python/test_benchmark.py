@@ -99,7 +99,7 @@ def test_the_policy_keeps_robots_upright_that_it_was_not_trained_on(kind):
 
 @pytest.mark.slow
 def test_an_edumips_estimate_is_not_led_astray_by_the_evidence():
-    """Turning on a slope, the evidence's tilt was off by 50 mrad when an event led and the control took it."""
+    """Turning on a slope, the evidence errs by 50 mrad in tilt; when an event led, the control took it."""
     for robot in (19, 143, 151, 229, 342):  # all were lost
         assert policy.stays_upright("mip", runs.config_path("mip"), robot, "mujoco", "built2025")
 
