@@ -94,7 +94,8 @@ const std::vector<Reason>& safety_reasons() {
       {kOverrun, "overrun", "a tick came later than safety.max_stalled_ticks, or ticks were late too often",
        "remove other load; equipoise bench measures it"},
       {kPickedUp, "picked_up",
-       "a wheel turns faster than safety.max_wheel_rate_rad_s, its own turn aside, or the robot falls freely",
+       "a wheel turns faster than safety.max_wheel_rate_rad_s, the robot's own turn aside, or it falls "
+       "freely",
        "put the robot down, arm again"},
       {kStall, "stall", "a wheel is driven hard and does not turn for safety.max_stall_s", "free the wheel"},
       {kSaturated, "saturated", "motors at their limit for longer than safety.max_saturated_s",
