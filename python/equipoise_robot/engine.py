@@ -31,6 +31,7 @@ class Engine:
         self.applied, self.back = data.qfrc_applied[6:9], np.zeros(4)
         self.pushed = data.xfrc_applied[body("robot").id][:2]
         rolling = [body(name).id for name in (["ball"] if self.has_ball else ["right", "left"])]
+        # Neighbours.
         self.dragged, self.share = data.xfrc_applied[rolling[0] : rolling[-1] + 1, :2], 1.0 / len(rolling)
         self.seen = [
             (self.gyro, data.qvel[3:6]),
@@ -45,13 +46,13 @@ class Engine:
     def start(self) -> None:
         """At the attitude `R_WB`; a robot on two wheels turned about its y until both are on the floor."""
         data, lib = self.data, self.mujoco
-        lib.mju_mat2Quat(data.qpos[3:7], self.R_WB)
+        lib.mju_mat2Quat(self.attitude, self.R_WB)
         lib.mj_forward(self.model, data)
         if not self.has_ball:
             normal = self.R_WB.reshape(3, 3).T @ data.geom("floor").xmat[2::3]
-            about_y, leant = np.zeros(4), data.qpos[3:7].copy()
+            about_y, leant = np.zeros(4), self.attitude.copy()
             lib.mju_axisAngle2Quat(about_y, np.array([0.0, 1.0, 0.0]), np.arctan2(normal[0], normal[2]))
-            lib.mju_mulQuat(data.qpos[3:7], leant, about_y)
+            lib.mju_mulQuat(self.attitude, leant, about_y)
             lib.mj_forward(self.model, data)
         self.read()
 
