@@ -17,6 +17,13 @@ Mbbr::Sample at_rest() {
   return z;
 }
 
+Mip::Sample still() {
+  Mip::Sample z;
+  z.imu_ok = true;
+  z.accel_B_m_s2.z() = -kGravity_m_s2;
+  return z;
+}
+
 TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
   GrossSamples gross({true, true, false}, 0.0);
   const Mbbr::Sample z = at_rest();
@@ -38,9 +45,7 @@ TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
 
 TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
   GrossSamples gross({true, false, false}, 2.0 * kPi);
-  Mip::Sample z;
-  z.imu_ok = true;
-  z.accel_B_m_s2.z() = -kGravity_m_s2;
+  Mip::Sample z = still();
   z.gyro_B_rad_s.y() = 5.0;
   for (int i = 0; i < 20; ++i) {
     const Mip::Sample used = gross.without(z, Vec3::Zero());
@@ -52,9 +57,8 @@ TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
 
 TEST(GrossSamples, ABlowLeavesOutNoAxisOfTheGyro) {
   GrossSamples gross({true, false, false}, 2.0 * kPi);
-  Mip::Sample z;
-  z.imu_ok = true;
-  z.accel_B_m_s2.z() = -6.0 * kGravity_m_s2;
+  Mip::Sample z = still();
+  z.accel_B_m_s2 *= 6.0;
   for (int i = 0; i < 10; ++i) EXPECT_EQ(gross.without(z, Vec3::Zero()).imu_ok, i >= 3);
   EXPECT_FALSE(gross.left_out());
   EXPECT_TRUE(gross.trusted());
@@ -73,9 +77,7 @@ TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
 
 TEST(GrossSamples, ARobotThatStandsWithoutADeadAxisGoesOnUnlessItTurnsFast) {
   GrossSamples gross({true, false, false}, 2.0 * kPi);
-  Mip::Sample z;
-  z.imu_ok = true;
-  z.accel_B_m_s2.z() = -kGravity_m_s2;
+  Mip::Sample z = still();
   z.gyro_axis_ok[0] = false;
   for (const double turns_rad_s : {0.0, 6.0, -6.0}) {
     z.gyro_B_rad_s.z() = turns_rad_s;
