@@ -181,6 +181,22 @@ TEST(MbbrScheduledFeedback, FeedsForwardByEachOfItsNumbers) {
   EXPECT_EQ(u(&MbbrReference::rate_xy), Vec2(2.0, 4.0));
 }
 
+/// Gains are of a turn to the left; to the right they are their conjugates.
+TEST(MbbrScheduledFeedback, TurnsItsGainsWithTheTurn) {
+  MbbrScheduledFeedbackParams p;
+  p.gains.schedule.rows = 1;
+  p.gains.schedule.row[0] = {8.0, 1.5, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  const auto u = [&p](Vec2 MbbrReference::*what, double yaw_rate) {
+    MbbrReference ref;
+    ref.yaw_rate = yaw_rate;
+    ref.*what = Vec2(1.0, 2.0);
+    return Vec2(MbbrScheduledFeedback(p).update(ref).head<2>());
+  };
+  EXPECT_EQ(u(&MbbrReference::theta_xy, 3.0), Vec2(8.0 - 3.0, 16.0 + 1.5));
+  EXPECT_EQ(u(&MbbrReference::theta_xy, -3.0), Vec2(8.0 + 3.0, 16.0 - 1.5));
+  EXPECT_EQ(u(&MbbrReference::d_phi, -3.0), -Vec2(2.0 + 1.0, 4.0 - 0.5));
+}
+
 TEST(MbbrScheduledFeedback, OneTickWithoutANumberIsOne) {
   MbbrScheduledFeedbackParams p;
   p.gains.schedule.rows = 1;
