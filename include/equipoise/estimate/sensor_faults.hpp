@@ -55,6 +55,7 @@ class SensorFaults {
     roll_.reset();
     trusted_ = true;
     ticks_ = jumps_ = event_at_ = leads_for_ = 0;
+    wired_ = 0;
     rocks_at_ = -kRocking;
     stale_ = true;
   }
@@ -91,10 +92,8 @@ class SensorFaults {
   int bias_jumps() const noexcept { return jumps_; }
   /// A fault leads: what surprises the control's filter is about to be explained.
   bool suspects() const noexcept { return suspects_; }
-  /// Encoders that were found so early that they are wired so.
-  std::uint32_t wired_backwards() const noexcept {
-    return mirrored_at_ <= kArmingTicks ? used_.backwards : 0;
-  }
+  /// Encoders that were found so early that they are wired so, or one of which is, whichever it be.
+  std::uint32_t wired_backwards() const noexcept { return wired_; }
   /// Filters that ran in this tick.
   int ran() const noexcept { return ran_; }
   double ratio(std::size_t hypothesis) const noexcept { return members_[hypothesis].ratio; }
@@ -334,12 +333,16 @@ class SensorFaults {
     control.adopt(healthy_);
   }
 
-  /// One of them is true; the robot cannot go on with either.
+  /// One of them is true; the robot cannot go on with either. Which encoder counts backwards, who looks will
+  /// see.
   void stop(std::size_t one, std::size_t other) noexcept {
     evidence_.leading = kRows[one];
-    evidence_.decided = trusted_;
+    evidence_.decided = trusted_ && wired_ == 0;
     evidence_.verdicts |= 1U << kRows[one] | 1U << kRows[other];
-    trusted_ = false;
+    const FaultHypothesis &a = kHypotheses[one], &b = kHypotheses[other];
+    const bool backwards = a.kind == FaultHypothesis::kReversed && b.kind == a.kind;
+    if (backwards) wired_ |= a.mask | b.mask;
+    trusted_ = trusted_ && backwards;
   }
 
   /// It was pushed, has slipped or is shaken: what is used goes on from there, and every suspicion with it.
@@ -361,7 +364,7 @@ class SensorFaults {
     if (h.kind == FaultHypothesis::kReversed) {
       used_.backwards |= h.mask;
       used_.without_wheels |= h.mask;
-      mirrored_at_ = ticks_;
+      if (ticks_ <= kArmingTicks) wired_ |= h.mask;
     } else {
       used_ = m.used;
     }
@@ -386,8 +389,9 @@ class SensorFaults {
   FaultEvidence evidence_;
   bool stale_ = true;  // members have missed a tick
   bool trusted_ = true, suspects_ = false;
-  int ticks_ = 0, jumps_ = 0, ran_ = 1;  // since arming; filters in this tick
-  int mirrored_at_ = 0, event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
+  int ticks_ = 0, jumps_ = 0, ran_ = 1;                              // since arming; filters in this tick
+  std::uint32_t wired_ = 0;                                          // bits of encoders
+  int event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
   std::size_t leader_ = 0;
 };
 

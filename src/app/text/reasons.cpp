@@ -75,7 +75,7 @@ const std::vector<Reason>& safety_reasons() {
        {{When::kArming, "body rate", " rad/s", rate, &SafetyParams::max_arm_rate_rad_s}}},
       {kNotCalibrated, "not_calibrated", "no calibration yet",
        "equipoise calibrate gyro, or wait for the first second at rest"},
-      {kEncoderSign, "encoder_sign", "a wheel moved against the test pulse",
+      {kEncoderSign, "encoder_sign", "an encoder counts against its motor; of two wheels named, one does",
        "equipoise bringup finds swapped or reversed motors and encoders"},
       {kEstimatorUnhealthy,
        "estimator_unhealthy",
