@@ -82,6 +82,7 @@ TEST(Margins, WhatIsSlowDoesNotCount) {
   EXPECT_NEAR(of(integrator, 0.0, 9.0).phase_deg, 90.0, 0.01);
   EXPECT_TRUE(std::isinf(of(integrator, 0.0, 11.0).phase_deg));
   EXPECT_EQ(margins({2.0}, {0.5}, 0.0, 2.0).disk, 6.0) << "what is as fast as that does";
+  EXPECT_EQ(margins({0.5}, {0.5}, 0.0).disk, 6.0) << "nothing is, unless told so";
 }
 
 TEST(Margins, AroundACentreCountTheDelayFromTheWholeFrequency) {
@@ -107,6 +108,12 @@ TEST(Margins, TheCurveIsNotFollowedThroughZeroAndTheCentre) {
       EXPECT_NEAR(m.phase_deg, 90.0 - 0.7 * 90.0 / kHalfPi, 0.01);
     }
   }
+}
+
+TEST(Margins, NorThroughZeroWhereTheCentreIsElsewhere) {
+  const Margins m = of([](double w) { return 10.0 / (kJ * w) * std::polar(1.0, 0.7); }, 30.0);
+  EXPECT_TRUE(std::isinf(m.gain_up_dB)) << m.gain_up_dB;
+  EXPECT_TRUE(std::isinf(m.gain_down_dB)) << m.gain_down_dB;
 }
 
 TEST(Margins, AJumpFromTheFarSideIsNoCrossing) {
@@ -135,6 +142,8 @@ TEST(Margins, BetweenTwoPointsTheCurveIsFollowed) {
   const Margins m = margins({1.0, 3.0}, {-std::polar(2.0, 0.25), -std::polar(0.5, 0.75)}, 0.0);
   EXPECT_NEAR(m.phase_deg, 0.5 * 90.0 / kHalfPi, 1e-9);
   EXPECT_NEAR(m.delay_s, 0.5 / 2.0, 1e-9);
+  EXPECT_TRUE(std::isinf(m.gain_up_dB)) << "no further than the second: the axis is not reached";
+  EXPECT_TRUE(std::isinf(m.gain_down_dB));
   const Margins late = margins({1.0, 3.0}, {-std::polar(2.0, -0.25), -std::polar(0.5, -0.75)}, 0.0);
   EXPECT_NEAR(late.phase_deg, 0.5 * 90.0 / kHalfPi, 1e-9);
   EXPECT_NEAR(late.delay_s, (4.0 * kHalfPi - 0.5) / 2.0, 1e-9) << "nearly a whole turn";

@@ -116,6 +116,7 @@ TEST(MbbrReference, TravelGetsWhatTheTurnLeavesInItsDirection) {
     return Vec2(ball_velocity(0.032, ref.phi_dot_star));
   };
   EXPECT_LT((speed({0.6, 0.8}, 0.0) - Vec2(0.15, 0.2)).norm(), 1e-9);
+  EXPECT_LT((speed({1.2, 1.6}, 0.0) - Vec2(0.15, 0.2)).norm(), 1e-9);
   EXPECT_LT((speed({-0.6, 0.8}, -3.0) - Vec2(-0.06, 0.08)).norm(), 1e-9);
   EXPECT_LT((speed({0.03, 0.04}, 3.0) - Vec2(0.03, 0.04)).norm(), 1e-9);
 }

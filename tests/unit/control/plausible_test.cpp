@@ -29,6 +29,7 @@ TEST(BeyondRecovery, NamesMotorsThatAreTooWeakAndFallsThatAreTooFast) {
   EXPECT_EQ(problem->parameter, "com_height_m, body_mass_kg or k1_N_m");
   EXPECT_NE(problem->why.find("0.039"), std::string::npos) << problem->why;
   EXPECT_FALSE(beyond_recovery(pendulum(24.9), push(100.0), 0));
+  EXPECT_FALSE(beyond_recovery(pendulum(0.5), push(1.0), 0)) << "it may fall as slowly as it likes";
   problem = beyond_recovery(pendulum(25.1), push(100.0), 0);
   ASSERT_TRUE(problem);
   EXPECT_EQ(problem->parameter, "com_height_m");
