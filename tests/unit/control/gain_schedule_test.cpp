@@ -27,7 +27,7 @@ TEST(GainSchedule, IsLinearBetweenItsRowsAndExactOnThem) {
 
 TEST(GainSchedule, HoldsItsEnds) {
   EXPECT_EQ(schedule(3)(-1.0), (std::array<double, 2>{1.0, -1.0}));
-  EXPECT_EQ(schedule(3)(100.0), (std::array<double, 2>{7.0, 0.0}));
+  for (const double beyond : {3.5, 100.0}) EXPECT_EQ(schedule(3)(beyond), (std::array<double, 2>{7.0, 0.0}));
   EXPECT_EQ(schedule(2)(100.0), (std::array<double, 2>{5.0, -2.0})) << "rows beyond the last are none";
   EXPECT_EQ(schedule(1)(100.0), (std::array<double, 2>{1.0, -1.0}));
 }

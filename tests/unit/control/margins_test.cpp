@@ -116,6 +116,11 @@ TEST(Margins, NorThroughZeroWhereTheCentreIsElsewhere) {
   EXPECT_TRUE(std::isinf(m.gain_down_dB)) << m.gain_down_dB;
 }
 
+TEST(Margins, UpToTheCentreItIs) {
+  const std::vector<Complex> L{-std::polar(2.0, 0.5), -std::polar(0.5, 0.5), -std::polar(0.5, 0.5)};
+  EXPECT_NEAR(margins({1.0, 2.0, 4.0}, L, 3.0).phase_deg, 0.5 * 90.0 / kHalfPi, 1e-9);
+}
+
 TEST(Margins, AJumpFromTheFarSideIsNoCrossing) {
   EXPECT_TRUE(std::isinf(
       margins({1.0, 2.0}, {-std::polar(2.0, 2.0), -std::polar(2.0, -1.0)}, 0.0, 0.0).gain_down_dB));

@@ -21,7 +21,8 @@ HEAD = """# Mutation testing
 Written by `tools/mutation`. A mutant is the firmware with one token changed: a relation (`<` → `<=`), an
 operator (`+` → `-`, `&&` → `||`), a number (n → n + 1, x → 2 x), a condition negated, a statement
 removed. It is killed when a test of its room fails or exceeds ten times its usual time. Changes that do not
-compile, or to the same object code, are not counted.
+compile, or to the same object code, are not counted; nor, in the rate, are those whose reason says that they do
+the same ("explained").
 
 Mutants are drawn at random; intervals are Wilson's, 95 %. Sample "5 without 1, 2" is that of seed 5 without
 the mutants of the samples of seeds 1 and 2: those showed what the tests lacked, and tests were written for
@@ -77,10 +78,11 @@ def room_row(name: str, root: Path, sample: str, outcomes: Outcomes, explained: 
     whole = sum(len(mutants(path.read_text())) for path in ROOMS[name].paths(root))
     cells: tuple[object, ...] = (name, whole, "", 0, "", "", "", "not measured", target, "not measured")
     if tried:
-        low, high = wilson(killed, tried)
-        rate = f"{100 * killed / tried:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
-        holds = "yes" if killed / tried >= ROOMS[name].target else "**no**"
-        holds = holds if tried >= FEWEST else "too few"
+        telling = tried - explained
+        low, high = wilson(killed, telling)
+        rate = f"{100 * killed / telling:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+        holds = "yes" if killed / telling >= ROOMS[name].target else "**no**"
+        holds = holds if telling >= FEWEST else "too few"
         cells = (name, whole, sample, tried, killed, tried - killed, explained, rate, target, holds)
     known, noticed = counted(before)
     return f"| {' | '.join(map(str, cells))} | {f'{noticed} of {known}' if known else ''} |\n"
