@@ -44,6 +44,7 @@ TEST(FrictionCompensation, IsTheSmoothedSignTimesWhatIsCompensated) {
   EXPECT_NEAR(half.compensate<2>(Vec2(50.0, -50.0)).x(), 0.4, 1e-12) << "all of it, unless told otherwise";
   half.gain = 0.5;
   EXPECT_NEAR(half.compensate<2>(Vec2(50.0, -50.0)).y(), -0.2, 1e-12);
+  EXPECT_NEAR(half.compensate<2>(Vec2(50.0, -1.5)).y(), 0.2 * (std::exp(-3.0) - 1.0), 1e-15);
 }
 
 }  // namespace

@@ -90,6 +90,10 @@ TEST(WithoutMargin, WhatIsNotStableHasNone) {
   const auto problem = integrator(3.0, 80.0);
   ASSERT_TRUE(problem);
   EXPECT_EQ(problem->why, "no gain stabilises this robot");
+  const SampledSystem loop{CMatrix::Ones(1, 1), CMatrix::Constant(1, 1, kTickS), CMatrix::Zero(1, 1)};
+  const auto gain = [](Complex) { return CMatrix{{1.0, 0.0}}; };
+  EXPECT_FALSE(without_margin(loop, 0.999, gain));
+  EXPECT_TRUE(without_margin(loop, 1.0, gain)) << "nor what neither grows nor decays";
 }
 
 TEST(TooFastForTheTick, IsAModeBeyondOnePerTick) {

@@ -245,6 +245,7 @@ ROOMS: dict[str, Room] = {
                 only=("*/chain.hpp", "src/control/*.cpp"),
             ),
         ),
+        target=0.9,
     ),
     "robot_control": Room(
         (
