@@ -249,7 +249,7 @@ def main() -> int:
     if not arguments.write:
         print(page)
         return 0
-    data_file.write_text(json.dumps(data, indent=1, sort_keys=True) + "\n")
+    data_file.write_text(json.dumps(data, sort_keys=True) + "\n")
     text = (root / PAGE).read_text()
     (root / PAGE).write_text(text[: text.index(START)] + START + "\n" + page)
     return 0
