@@ -21,8 +21,8 @@ HEAD = """# Mutation testing
 Written by `tools/mutation`. A mutant is the firmware with one token changed: a relation (`<` → `<=`), an
 operator (`+` → `-`, `&&` → `||`), a number (n → n + 1, x → 2 x), a condition negated, a statement
 removed. It is killed when a test of its room fails or exceeds ten times its usual time. Changes that do not
-compile, or to the same object code, are not counted; nor, in the rate, are those whose reason says that they do
-the same ("explained").
+compile, or to the same object code, are not counted; nor, in the rate, are those whose reason says that they
+do the same ("explained").
 
 Mutants are drawn at random; intervals are Wilson's, 95 %. Sample "5 without 1, 2" is that of seed 5 without
 the mutants of the samples of seeds 1 and 2: those showed what the tests lacked, and tests were written for
