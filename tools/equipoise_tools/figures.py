@@ -236,11 +236,10 @@ class Report:
             if len(self.summary.estimators) > 1:  # they differ by orders of magnitude
                 axes.set_yscale("log")
                 axes.set_ylim(*error_range([line.get_ydata() for line in axes.lines]))
-            else:
+                box = {"frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 0.8}
+                axes.legend(loc="upper right", ncols=2, **box)
+            else:  # the figure's legend names it
                 axes.set_ylim(bottom=0)
-            axes.legend(
-                loc="upper right", ncols=2, frameon=True, facecolor="white", edgecolor="none", framealpha=0.8
-            )
             self.finish_time_axis(axes)
 
         return draw
