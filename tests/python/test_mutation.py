@@ -91,6 +91,9 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     assert "not tried since the tests changed" in page and not unexplained
     del store.lines[list(store.lines)[-1]]
     assert len(kept(store, sample, "")) < len(told)
+    every = {("drivers/limit.c", "if (x > 10) return 10;", m.change): "the same" for *_, m, _ in told}
+    page, _ = write_page({"own": [each for each in told if each[3].status == "survived"]}, every, 1, tmp_path)
+    assert "not measured" in page and "the same" in page, "of what all do the same nothing is known"
     page, _ = write_page({"own": []}, {}, 1, tmp_path)
     assert f"| own | {len(told)} |  | 0 |  |  |  | not measured | 80 % | not measured |  |" in page
 

@@ -77,8 +77,8 @@ def room_row(name: str, root: Path, sample: str, outcomes: Outcomes, explained: 
     target = f"{100 * ROOMS[name].target:.0f} %"
     whole = sum(len(mutants(path.read_text())) for path in ROOMS[name].paths(root))
     cells: tuple[object, ...] = (name, whole, "", 0, "", "", "", "not measured", target, "not measured")
-    if tried:
-        telling = tried - explained
+    telling = tried - explained
+    if telling:
         low, high = wilson(killed, telling)
         rate = f"{100 * killed / telling:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
         holds = "yes" if killed / telling >= ROOMS[name].target else "**no**"
