@@ -92,7 +92,7 @@ class SensorFaults {
   int bias_jumps() const noexcept { return jumps_; }
   /// A fault leads: what surprises the control's filter is about to be explained.
   bool suspects() const noexcept { return suspects_; }
-  /// Encoders that were found so early that they are wired so, or one of which is, whichever it be.
+  /// Encoders that are wired backwards: found soon after arming, or two of which one is.
   std::uint32_t wired_backwards() const noexcept { return wired_; }
   /// Filters that ran in this tick.
   int ran() const noexcept { return ran_; }
@@ -333,8 +333,8 @@ class SensorFaults {
     control.adopt(healthy_);
   }
 
-  /// One of them is true; the robot cannot go on with either. Which encoder counts backwards, who looks will
-  /// see.
+  /// One of them is true; the robot cannot go on with either. Two reversed encoders say nothing against the
+  /// gyro.
   void stop(std::size_t one, std::size_t other) noexcept {
     evidence_.leading = kRows[one];
     evidence_.decided = trusted_ && wired_ == 0;
@@ -386,11 +386,11 @@ class SensorFaults {
   Filter predicted_;  // without this tick's samples
   std::array<Member, kCount> members_;
   Used used_;
+  std::uint32_t wired_ = 0;  // wired_backwards()
   FaultEvidence evidence_;
   bool stale_ = true;  // members have missed a tick
   bool trusted_ = true, suspects_ = false;
   int ticks_ = 0, jumps_ = 0, ran_ = 1;                              // since arming; filters in this tick
-  std::uint32_t wired_ = 0;                                          // bits of encoders
   int event_at_ = 0, rocks_at_ = 0, undecided_ = 0, leads_for_ = 0;  // ticks
   std::size_t leader_ = 0;
 };
