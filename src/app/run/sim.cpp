@@ -91,6 +91,7 @@ int run_sim(Arguments a) {
   SimRequest& request = a.request;
   const auto robot = load_for(&request);
   if (a.log.empty()) a.log = new_log_name("sim", robot->type->name);
+  watch_interrupts();  // before the log exists: whoever sees it may interrupt
 
   runtime::TelemetryOptions telemetry_options;
   telemetry_options.log_path = a.log == "off" ? "" : a.log;
@@ -103,7 +104,6 @@ int run_sim(Arguments a) {
   runtime::Telemetry telemetry(telemetry_options);
 
   SimOptions options = options_for(request, *robot);
-  watch_interrupts();
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   Pace pace(a.realtime, options.duration_s, stderr);
   options.log_failed = &telemetry.log_failed();
