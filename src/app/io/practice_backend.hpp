@@ -56,7 +56,7 @@ class PracticeBackend : public Backend {
     const auto due_in = static_cast<std::int64_t>(static_cast<double>(simulated_ns) / speed_);
     const std::int64_t now_ns = runtime::monotonic_now_ns();
     if (start_ns_ == 0 || now_ns > start_ns_ + due_in + kLost_ns) start_ns_ = now_ns - due_in;
-    runtime::sleep_until(start_ns_ + due_in);
+    if (start_ns_ + due_in > now_ns) runtime::sleep_until(start_ns_ + due_in);
   }
 
   FaultBackend broken_;
