@@ -296,7 +296,9 @@ def write(name: str, result: Result, out_dir: Path) -> None:
     out_dir.mkdir(parents=True, exist_ok=True)
     (out_dir / f"{name}.md").write_text(page(name, result))
     record = record_of(result)
-    findings = ",\n".join(json.dumps(f, ensure_ascii=False) for f in record.pop("findings"))
+    findings = ",\n".join(
+        json.dumps(f, ensure_ascii=False, separators=(",", ":")) for f in record.pop("findings")
+    )
     head = json.dumps(record, indent=1, ensure_ascii=False).removesuffix("\n}")
     (out_dir / f"{name}.json").write_text(f'{head},\n "findings": [\n{findings}\n]}}\n')
 
