@@ -52,6 +52,9 @@ def test_the_package_chooses_the_overlays_that_fit_the_running_kernel(root, tmp_
     assert subprocess.run(choose, capture_output=True, text=True, check=True).stdout == f"{cells}\n"
     for name in ("cape", "can", "blue"):
         assert (firmware / f"equipoise-{name}.dtbo").read_text() == f"{name} {cells}"
+    (scm / "pinmux@800/#pinctrl-cells").write_bytes(bytes([0, 0, 0, 3]))  # what no overlay is made for
+    ended = subprocess.run(choose, capture_output=True, text=True, check=True)
+    assert ended.stderr.count("#pinctrl-cells = <3>") == 3 and not list(firmware.glob("equipoise-*[a-z].dtbo"))
 
 
 def test_interrupt_threads_of_the_robot_come_before_those_of_ethernet_and_mmc(root, tmp_path):
@@ -66,6 +69,9 @@ def test_interrupt_threads_of_the_robot_come_before_those_of_ethernet_and_mmc(ro
     for number, name in names.items():
         (tmp_path / f"proc/{number}").mkdir(parents=True)
         (tmp_path / f"proc/{number}/comm").write_text(f"{name}\n")
+    (tmp_path / "proc/31").mkdir()  # a program that gave itself the name of one
+    (tmp_path / "proc/31/comm").write_text("irq/52-4819c000\n")
+    (tmp_path / "proc/31/exe").symlink_to("/bin/true")
     governor = tmp_path / "sys/devices/system/cpu/cpufreq/policy0/scaling_governor"
     governor.parent.mkdir(parents=True)
     governor.write_text("schedutil\n")
@@ -109,6 +115,8 @@ def test_the_service_is_understood_and_gives_what_the_doctor_asks_for(root, tmp_
     unit = (root / "packaging/equipoise.service").read_text()
     for line in ("Type=notify", "WatchdogSec=2", "LimitRTPRIO=99", "LimitMEMLOCK=infinity", "Restart=no"):
         assert f"\n{line}\n" in unit
+    allowed = set(re.findall(r"^DeviceAllow=char-(\S+) ", unit, re.M))
+    assert allowed >= {"i2c", "iio", "gpiochip", "ttyS", "ttyO", "input"}  # what the drivers open
     after = re.search(r"^ExecStopPost=/bin/sh -c '(.*)'$", unit, re.M)[1].replace("$$", "$")
     for channel in ("pwm0", "pwm-7:1"):
         (tmp_path / "pwmchip7" / channel).mkdir(parents=True)
