@@ -236,7 +236,17 @@ def test_nonsense_is_answered_with_motors_off_and_a_reason(root, tmp_path, messa
 def test_nobody_comes(root, tmp_path):
     status, _, complaint = Firmware(root, tmp_path, "--timeout-s", "0.1").end()
     assert status == 1
-    assert "no physics engine connected" in complaint
+    assert f"no physics engine connected to {tmp_path}/io.sock within 0.1 s" in complaint
+
+
+def test_who_has_taken_its_place_keeps_the_path(root, tmp_path):
+    first = Firmware(root, tmp_path, "--timeout-s", "2").listening()
+    (tmp_path / "io.sock").unlink()
+    second = Firmware(root, tmp_path).listening()
+    assert first.end()[0] == 1
+    with second.connect() as connection:
+        step(connection, Robot(0.01), 0, last=True)
+    assert second.end()[0] == 0
 
 
 def test_a_path_in_use_is_refused_and_left_alone(root, tmp_path):

@@ -54,6 +54,11 @@ void clear_stale(const std::string& path, const sockaddr_un& address) {
   unlink(path.c_str());
 }
 
+ino_t inode_of(const std::string& path) {
+  struct stat what {};
+  return lstat(path.c_str(), &what) == 0 ? what.st_ino : 0;
+}
+
 /// 1 readable, 0 timeout, -errno.
 int wait_readable(int fd, int timeout_ms) {
   pollfd wanted{fd, POLLIN, 0};
@@ -77,11 +82,12 @@ LockstepServer::LockstepServer(const std::string& path) : path_(path) {
     if (fd_ >= 0) ::close(fd_);
     throw InputError("--socket " + path + ": " + std::strerror(bound ? errno : error));
   }
+  inode_ = inode_of(path);
 }
 
 LockstepServer::~LockstepServer() {
+  if (inode_of(path_) == inode_) unlink(path_.c_str());  // an open socket's number is nobody else's
   ::close(fd_);
-  unlink(path_.c_str());
 }
 
 int LockstepServer::accept_engine(double timeout_s) const {

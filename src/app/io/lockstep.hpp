@@ -5,6 +5,8 @@
 // rules.
 #pragma once
 
+#include <sys/types.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +20,7 @@
 namespace equipoise::app {
 
 /// Listens on the path, for its owner only. A socket nobody listens on any more is replaced; anything else in
-/// the way is an InputError. Removes the path at the end.
+/// the way is an InputError. Removes the path at the end, unless somebody else has it by then.
 class LockstepServer : NoCopy {
  public:
   explicit LockstepServer(const std::string& path);
@@ -30,6 +32,7 @@ class LockstepServer : NoCopy {
  private:
   std::string path_;
   int fd_ = -1;
+  ino_t inode_ = 0;  // what this one has made there
 };
 
 enum class LockstepEnd : std::size_t { kRunning, kFinished, kPeerGone, kTimeout, kProtocol };

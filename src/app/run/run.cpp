@@ -11,6 +11,7 @@
 #include "app/run/runner.hpp"
 #include "app/run/wires.hpp"
 #include "app/text/files.hpp"
+#include "app/text/format.hpp"
 #include "bbb.h"
 #include "config/population.hpp"
 #include "equipoise/runtime/command_key.hpp"
@@ -34,8 +35,7 @@ int run_lockstep(const RunArguments& a, const RobotType& robot) {
       if (interrupted.load()) last.end = "interrupted";
       if (trials > 0 || interrupted.load()) break;  // the last trial's error says it
       last.end = "timeout";
-      last.error =
-          "no physics engine connected to " + a.socket + " within " + std::to_string(a.timeout_s) + " s";
+      last.error = "no physics engine connected to " + a.socket + format(" within %g s", a.timeout_s);
       last.trial.verdict.ended = Ended::kDevice;
       break;
     }

@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "app/run/run_arguments.hpp"
+#include "app/text/format.hpp"
 #include "app/text/reasons.hpp"
 #include "app/text/version.hpp"
 
@@ -42,8 +43,8 @@ int report(const RunArguments& a, const ConfiguredRobot& robot, Outcome o, int t
            const nlohmann::json& session) {
   const Trial& t = o.trial;
   if (o.error.empty() && t.verdict.fell() && t.armed)
-    o.error = "the motors went off at " + std::to_string(t.verdict.fell_at_s) +
-              " s: " + reasons_text(t.verdict.reasons);
+    o.error =
+        format("the motors went off at %.2f s: ", t.verdict.fell_at_s) + reasons_text(t.verdict.reasons);
   if (o.error.empty() && a.arm && a.command_key.empty() && !t.armed && t.duration_s() > 0.6)
     o.error = "the robot never armed: " + reasons_text(t.verdict.reasons);
   std::FILE* const out = a.json == "-" ? stderr : stdout;
