@@ -67,6 +67,40 @@ def test_an_arm_that_send_live_was_stopped_over_is_void(robot):
     assert not robot.end()["armed"]
 
 
+SUSPENDED = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+int clock_gettime(clockid_t clock, struct timespec* t) {
+  int (*real)(clockid_t, struct timespec*) = (int (*)(clockid_t, struct timespec*))dlsym(RTLD_NEXT, "clock_gettime");
+  const int status = real(clock, t);
+  if (clock == CLOCK_BOOTTIME && access(getenv("SUSPENDED"), F_OK) == 0) t->tv_sec += 100;
+  return status;
+}
+"""
+
+
+def test_an_arm_that_the_machine_was_suspended_over_is_void(robot, tmp_path):
+    """A suspended machine's monotonic clock stands still: only that of its start shows it."""
+    library, suspended = tmp_path / "suspended.so", tmp_path / "suspended"
+    command = [os.environ.get("CC", "cc"), "-shared", "-fPIC", "-x", "c", "-", "-o", library]
+    subprocess.run(command, input=SUSPENDED, text=True, check=True)
+    send = robot.send("--timeout-s", PATIENCE_S, "--live")
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    asleep = os.environ | {"LD_PRELOAD": str(library), "SUSPENDED": str(suspended)}
+    with subprocess.Popen(send, **pipes, text=True, env=asleep) as live:
+        assert json.loads(live.stdout.readline())["state"] == "off"
+        live.send_signal(signal.SIGSTOP)
+        live.stdin.write("arm\n")
+        live.stdin.close()
+        suspended.touch()
+        live.send_signal(signal.SIGCONT)
+        assert "was stopped for 100" in live.stderr.read()
+    assert not robot.end()["armed"]
+
+
 def test_an_arm_that_was_stopped_at_its_start_is_void(robot):
     robot.told("--disarm")  # it is there
     with subprocess.Popen(robot.send("--arm"), stderr=subprocess.PIPE, text=True) as late:

@@ -13,8 +13,13 @@ inline std::int64_t monotonic_now_ns() noexcept {
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
 }
 
-/// For waits and silences; not for ticks.
-inline double now_s() noexcept { return 1e-9 * static_cast<double>(monotonic_now_ns()); }
+/// For waits and silences; not for ticks. Goes on while the machine is suspended, as monotonic_now_ns() does
+/// not.
+inline double now_s() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 /// Returns early when a signal comes.
 inline void sleep_until(std::int64_t at_ns) noexcept {

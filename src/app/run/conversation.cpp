@@ -2,25 +2,23 @@
 
 #include <unistd.h>
 
-#include <ctime>
 #include <fstream>
 #include <sstream>
 
 #include "app/cli/interrupt.hpp"
 #include "app/run/wires.hpp"
 #include "app/text/format.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using runtime::now_s;
 
-Clock::time_point after(double seconds) {
-  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-}
+double after(double seconds) { return now_s() + seconds; }
 
 /// When somebody asked for this process.
-Clock::time_point process_start() {
+double process_start_s() {
   std::ifstream file("/proc/self/stat");
   std::string text;
   std::getline(file, text);
@@ -28,27 +26,21 @@ Clock::time_point process_start() {
   std::string field;
   constexpr int kStartTime = 20;  // the 22nd of all, in clock ticks since the machine's start
   for (int i = 0; i < kStartTime; ++i) fields >> field;
-  timespec up{};
-  if (!fields || clock_gettime(CLOCK_BOOTTIME, &up) != 0) return Clock::now();
-  const double age_s = static_cast<double>(up.tv_sec) + 1e-9 * static_cast<double>(up.tv_nsec) -
-                       std::stod(field) / static_cast<double>(sysconf(_SC_CLK_TCK));
-  return after(-age_s);
+  return fields ? std::stod(field) / static_cast<double>(sysconf(_SC_CLK_TCK)) : now_s();
 }
 
 }  // namespace
 
 Conversation::Conversation(const SendArguments& a, const runtime::CommandKeys& keys)
     : a_(a),
-      awake_(process_start() +
-             std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
-                 std::max(0.0, a.timeout_s - kStopped_s)))),  // a busy machine starts it late
+      awake_s_(process_start_s() + std::max(0.0, a.timeout_s - kStopped_s)),  // a busy machine starts it late
       sender_(keys, a.robot, a.holder),
       robot_(a.robot.empty() ? keys.robot() : a.robot),
       wire_(open_wire(a.url, runtime::WireSide::kOwner)) {}
 
 void Conversation::listen(double seconds) {
   constexpr int kPatience_ms = 10;
-  const auto end = after(seconds);
+  const double end = after(seconds);
   do {
     note_awake();
     wire_->listen(kPatience_ms, [this](const std::uint8_t* data, std::size_t size) {
@@ -58,13 +50,13 @@ void Conversation::listen(double seconds) {
     });
     note_awake();
     while (const auto question = sender_.ask()) say(*question);
-  } while (Clock::now() < end && !interrupted.load());
+  } while (now_s() < end && !interrupted.load());
 }
 
 /// And a while longer: a second one of the same name and key must not go unnoticed.
 void Conversation::find_robots() {
-  for (const auto limit = after(a_.timeout_s); sender_.links().empty(); listen(0.0)) {
-    if (Clock::now() < limit && !interrupted.load()) continue;
+  for (const double limit = after(a_.timeout_s); sender_.links().empty(); listen(0.0)) {
+    if (now_s() < limit && !interrupted.load()) continue;
     if (sender_.deaf())
       throw std::runtime_error("a robot answers on " + a_.url +
                                ", but it has not the same key; has that been rotated?");
@@ -78,9 +70,9 @@ void Conversation::find_robots() {
 }
 
 void Conversation::note_awake() {
-  const auto now = Clock::now();
-  stopped_s_ = std::max(stopped_s_, std::chrono::duration<double>(now - awake_).count());
-  awake_ = now;
+  const double now = now_s();
+  stopped_s_ = std::max(stopped_s_, now - awake_s_);
+  awake_s_ = now;
 }
 
 void Conversation::refuse_if_late(std::int8_t action) const {
@@ -94,14 +86,13 @@ void Conversation::refuse_if_late(std::int8_t action) const {
 bool Conversation::begin_turn(Link* link, std::int8_t action) {
   const std::int64_t turn = link->turn;
   const std::int64_t first = link->signed_up_to + 1;
-  for (const auto limit = after(a_.timeout_s); link->turn == turn;) {
-    if (Clock::now() > limit || interrupted.load()) fail("confirms nothing");
+  for (const double limit = after(a_.timeout_s); link->turn == turn;) {
+    if (now_s() > limit || interrupted.load()) fail("confirms nothing");
     listen(0.0);
     refuse_if_late(action);
     if (link->turn != turn) break;
     say(sender_.sign(link, turn, action));
-    for (const auto next = after(wire_->interval_s()); Clock::now() < next && link->turn == turn;)
-      listen(0.0);
+    for (const double next = after(wire_->interval_s()); now_s() < next && link->turn == turn;) listen(0.0);
   }
   return sender_.began_turn(*link, first);
 }
@@ -112,9 +103,9 @@ void Conversation::begin_turn(std::int8_t action, const char* what) {
 
 void Conversation::wait_until_armed() {
   const std::int64_t turn = robot().turn;
-  for (const auto limit = after(a_.timeout_s); robot().state != command_session_t::ARMED; listen(0.0)) {
+  for (const double limit = after(a_.timeout_s); robot().state != command_session_t::ARMED; listen(0.0)) {
     if (robot().turn != turn) fail("did not arm: " + overtaken(robot()));
-    if (robot().state != command_session_t::WAITING || Clock::now() > limit)
+    if (robot().state != command_session_t::WAITING || now_s() > limit)
       fail("does not arm; its log, its LEDs and equipoise doctor say why");
   }
 }
@@ -122,19 +113,18 @@ void Conversation::wait_until_armed() {
 /// Whoever disarms wants it off: an arm in between is answered by the next disarm. Of two robots with one
 /// name and key, both.
 void Conversation::disarm_all() {
-  const auto others = after(kOthers_s);
-  const auto limit = after(a_.timeout_s);
-  for (std::size_t i = 0; i < sender_.links().size() || Clock::now() < others;) {
+  const double others = after(kOthers_s);
+  const double limit = after(a_.timeout_s);
+  for (std::size_t i = 0; i < sender_.links().size() || now_s() < others;) {
     if (i == sender_.links().size()) {
       listen(0.0);
       continue;
     }
     const bool ours = begin_turn(&sender_.links()[i], signed_command_t::DISARM);
-    while (ours && sender_.links()[i].state == command_session_t::WAITING && Clock::now() < limit)
-      listen(0.0);
+    while (ours && sender_.links()[i].state == command_session_t::WAITING && now_s() < limit) listen(0.0);
     if (sender_.links()[i].state == command_session_t::OFF) {
       ++i;
-    } else if (Clock::now() > limit) {
+    } else if (now_s() > limit) {
       fail("has taken the disarm, but its motors are not off");
     }
   }
@@ -143,21 +133,21 @@ void Conversation::disarm_all() {
 std::int64_t Conversation::drive() {
   const std::int64_t turn = robot().turn;
   const runtime::CommandSender::Motion motion{{a_.drive_mps, a_.sideways_mps}, 2.0 * kPi * a_.yaw_hz};
-  const auto end = after(a_.duration_s);
-  auto silent = after(a_.timeout_s);
+  const double end = after(a_.duration_s);
+  double silent = after(a_.timeout_s);
   for (std::int64_t sent = 1;; ++sent) {
     const std::int64_t confirmed = robot().confirmed;
     refuse_if_late(signed_command_t::DRIVE);
     say(sender_.sign(&robot(), turn, signed_command_t::DRIVE, motion));
     listen(wire_->interval_s());
-    const bool last = Clock::now() >= end || interrupted.load();
-    for (const auto limit = after(kAnswer_s); last && confirms_more(); listen(0.0)) {
-      if (Clock::now() > limit) break;  // one was lost: say it again
+    const bool last = now_s() >= end || interrupted.load();
+    for (const double limit = after(kAnswer_s); last && confirms_more(); listen(0.0)) {
+      if (now_s() > limit) break;  // one was lost: say it again
     }
     if (robot().turn != turn) fail("drives no more as told: " + overtaken(robot()));
     if (robot().confirmed > confirmed) silent = after(a_.timeout_s);
     if (last && !confirms_more()) return sent;
-    if (Clock::now() > silent) fail("took none or not all of " + std::to_string(sent) + " commands");
+    if (now_s() > silent) fail("took none or not all of " + std::to_string(sent) + " commands");
   }
 }
 

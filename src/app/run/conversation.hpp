@@ -2,7 +2,6 @@
 // confirms. In: arguments, key, wire -> out: a request done, or runtime_error saying why not. Not RT-safe.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -52,7 +51,6 @@ class Conversation {
   void relay(int requests);
 
  private:
-  using Clock = std::chrono::steady_clock;
   using Link = runtime::CommandSender::Link;
 
   void listen(double seconds);
@@ -74,8 +72,8 @@ class Conversation {
   static constexpr double kOthers_s = 0.25;  // for every robot there to have answered
 
   const SendArguments& a_;
-  Clock::time_point awake_;  // last known to run; at first, when the process was started
-  double stopped_s_ = 0.0;   // the longest that it was not
+  double awake_s_;          // last known to run; at first, when the process was started
+  double stopped_s_ = 0.0;  // the longest that it was not
   runtime::CommandSender sender_;
   std::string robot_;
   std::unique_ptr<runtime::CommandWire> wire_;

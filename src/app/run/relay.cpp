@@ -16,6 +16,7 @@
 #include "app/run/conversation.hpp"
 #include "app/text/errors.hpp"
 #include "app/text/json.hpp"
+#include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {
 
@@ -95,26 +96,25 @@ const char* word(std::int8_t state) {
 }  // namespace
 
 void Conversation::relay(int requests) {
-  const auto patience =
-      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(a_.timeout_s));
+  using runtime::now_s;
   Lines lines(requests);
   std::int64_t turn = robot().turn;  // in which whoever writes the lines decides
   constexpr std::int8_t kNone = signed_command_t::ASK;
   std::int8_t wish = kNone;  // arm, disarm or heading reset, repeated until a turn begins
   std::int64_t wish_turn = 0;
   std::int64_t wish_first = 0;
-  Clock::time_point wish_ends{};
+  double wish_ends_s = 0.0;
   std::optional<runtime::CommandSender::Motion> motion;  // the newest of this turn, not yet sent
-  Clock::time_point next{};
+  double next_s = 0.0;
   std::int64_t heard_ms = robot().heard_ms;
-  Clock::time_point heard_at = Clock::now();
+  double heard_at_s = now_s();
   nlohmann::json told;
 
   const auto decide = [&](std::int8_t action) {
     wish = action;
     wish_turn = robot().turn;
     wish_first = robot().signed_up_to + 1;
-    wish_ends = Clock::now() + patience;
+    wish_ends_s = now_s() + a_.timeout_s;
     motion.reset();
   };
   const auto tell = [&](const nlohmann::json& what) {
@@ -148,16 +148,15 @@ void Conversation::relay(int requests) {
         requested->end());
   };
 
-  const auto disarming = [&] { return wish == signed_command_t::DISARM && Clock::now() < wish_ends; };
+  const auto disarming = [&] { return wish == signed_command_t::DISARM && now_s() < wish_ends_s; };
   while ((!lines.ended() || disarming()) && !interrupted.load()) {
-    listen(0.0);
-    if (sender_.links().size() > 1) fail("has started anew, or there are two of that name");
-    if (robot().heard_ms != heard_ms) heard_at = Clock::now();
-    heard_ms = robot().heard_ms;
-    if (Clock::now() > heard_at + patience) fail("no longer answers");
     std::vector<LiveRequest> requested;
     read_requests(&requested);
     listen(0.0);  // and sees whether it was stopped
+    if (sender_.links().size() > 1) fail("has started anew, or there are two of that name");
+    if (robot().heard_ms != heard_ms || stopped_s_ > kStopped_s) heard_at_s = now_s();
+    heard_ms = robot().heard_ms;
+    if (now_s() > heard_at_s + a_.timeout_s) fail("no longer answers");
     void_if_late(&requested);
     for (const LiveRequest& request : requested) {
       if (request.action == signed_command_t::DRIVE) {
@@ -178,15 +177,14 @@ void Conversation::relay(int requests) {
         wish = kNone;
     }
     // A late arm surprises; a disarm never comes too late.
-    if (wish != kNone && wish != signed_command_t::DISARM && Clock::now() > wish_ends) wish = kNone;
+    if (wish != kNone && wish != signed_command_t::DISARM && now_s() > wish_ends_s) wish = kNone;
     note_awake();
     if (stopped_s_ > kStopped_s) continue;
-    if (Clock::now() >= next && (wish != kNone || (motion && robot().turn == turn))) {
+    if (now_s() >= next_s && (wish != kNone || (motion && robot().turn == turn))) {
       say(wish != kNone ? sender_.sign(&robot(), wish_turn, wish)
                         : sender_.sign(&robot(), turn, signed_command_t::DRIVE, *motion));
       if (wish == kNone) motion.reset();
-      next = Clock::now() +
-             std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(wire_->interval_s()));
+      next_s = now_s() + wire_->interval_s();
     }
     tell({{"state", word(robot().state)},
           {"turn", robot().turn},

@@ -30,6 +30,11 @@ BEAT_S = 0.1
 FURTHER_PART = re.compile(r"\.\d{4,}\.lcm$")  # of a log: its first is opened
 
 
+def running_s() -> float:
+    """Since the machine's start: nobody sets it, and it goes on while the machine is suspended."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
 class EventLog:
     """An LCM event log. An event is in the file, whole, or an OSError says why not."""
 
@@ -100,7 +105,7 @@ class Cockpit:
     # From the robot.
 
     def hear(self, channel: str, data: bytes) -> None:
-        now_s = time.monotonic()  # the machine's time of day may be set at any moment
+        now_s = running_s()
         if self.recording is not None and channel.startswith("EQUIPOISE_"):
             self._keep(channel, data)
         if channel == names.RUN:
@@ -146,7 +151,7 @@ class Cockpit:
         return {
             "robot": self.robot,
             "run": self.run,
-            "heard": time.monotonic() - self.heard_s < SILENT_S,
+            "heard": running_s() - self.heard_s < SILENT_S,
             "simulated": self.simulated
             and {
                 "running": self.simulated.running,
@@ -179,8 +184,8 @@ class Cockpit:
         while True:
             await asyncio.sleep(BEAT_S)
             for page in self.pages:
-                page.beat(time.monotonic())
-            if heard != (time.monotonic() - self.heard_s < SILENT_S):
+                page.beat(running_s())
+            if heard != (running_s() - self.heard_s < SILENT_S):
                 heard = not heard
                 self.changed()
             if self.recording is not None:  # its size grows

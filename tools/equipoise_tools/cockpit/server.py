@@ -19,7 +19,7 @@ import tornado.websocket
 
 from ..paths import UserError, repository_root
 from . import words
-from .hub import Cockpit
+from .hub import Cockpit, running_s
 from .playback import MAX_RATE, Playback
 
 HERE = Path(__file__).parent / "page"
@@ -198,7 +198,7 @@ class Page(tornado.websocket.WebSocketHandler):
             if do == "drive":
                 forward, left = (number(v, 2.0) for v in request["velocity_m_s"])
                 line = f"drive {forward:.4f} {left:.4f} {number(request['yaw_hz'], 5.0):.4f}"
-            age_s = time.monotonic() - number(request["seen"], 1e15)
+            age_s = running_s() - number(request["seen"], 1e15)
             if 0 <= age_s <= cockpit.fresh_s:
                 self._command(line, quiet=do == "drive")
             elif do != "drive":
