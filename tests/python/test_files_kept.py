@@ -272,6 +272,8 @@ def test_nor_are_those_of_a_hostile_log(do, log, tmp_path):
 def test_what_a_terminal_would_obey_is_not_printed(do):
     assert "\x1b" not in do("sim", "--config", "\x1b]0;title\x07", status=2)
     assert "\x1b" not in do("sim\x1b[2J", status=2)
+    told = do("sim", "--config", "gr\u00fcn\u009b2J", status=2)  # an escape of one character
+    assert "\u009b" not in told and "gr\u00fcn??2J" in told
 
 
 def test_too_few_descriptors_are_said_and_not_waited_for(root):

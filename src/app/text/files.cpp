@@ -66,9 +66,13 @@ void check_log(const std::string& path) { check_output(path, {std::string(runtim
 
 std::string printable(const std::string& text) {
   std::string out = text;
-  std::replace_if(
-      out.begin(), out.end(),
-      [](unsigned char c) { return (c < 0x20 && c != '\n' && c != '\t') || c == 0x7F; }, '?');
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const auto c = static_cast<unsigned char>(out[i]);
+    // U+0080 to U+009F, in two bytes, are what an escape begins in one.
+    const bool two = c == 0xC2 && i + 1 < out.size() && static_cast<unsigned char>(out[i + 1]) < 0xA0;
+    if ((c < 0x20 && c != '\n' && c != '\t') || c == 0x7F || two) out[i] = '?';
+    if (two) out[++i] = '?';
+  }
   return out;
 }
 
