@@ -54,7 +54,8 @@ def test_the_package_chooses_the_overlays_that_fit_the_running_kernel(root, tmp_
         assert (firmware / f"equipoise-{name}.dtbo").read_text() == f"{name} {cells}"
     (scm / "pinmux@800/#pinctrl-cells").write_bytes(bytes([0, 0, 0, 3]))  # what no overlay is made for
     ended = subprocess.run(choose, capture_output=True, text=True, check=True)
-    assert ended.stderr.count("#pinctrl-cells = <3>") == 3 and not list(firmware.glob("equipoise-*[a-z].dtbo"))
+    assert ended.stderr.count("#pinctrl-cells = <3>") == 3
+    assert not [file for file in firmware.iterdir() if "cell" not in file.name]
 
 
 def test_interrupt_threads_of_the_robot_come_before_those_of_ethernet_and_mmc(root, tmp_path):
