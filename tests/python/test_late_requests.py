@@ -74,7 +74,8 @@ SUSPENDED = """
 #include <time.h>
 #include <unistd.h>
 int clock_gettime(clockid_t clock, struct timespec* t) {
-  int (*real)(clockid_t, struct timespec*) = (int (*)(clockid_t, struct timespec*))dlsym(RTLD_NEXT, "clock_gettime");
+  int (*real)(clockid_t, struct timespec*);
+  *(void**)&real = dlsym(RTLD_NEXT, "clock_gettime");
   const int status = real(clock, t);
   if (clock == CLOCK_BOOTTIME && access(getenv("SUSPENDED"), F_OK) == 0) t->tv_sec += 100;
   return status;
