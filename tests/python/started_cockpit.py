@@ -81,9 +81,9 @@ async def talk(cockpit, requests, *, host=None, origin=None, token=None, answers
     with contextlib.suppress(WebSocketClosedError):
         for request in [{"do": "hello", "token": token}] * (token is not None) + requests:
             await socket.write_message(json.dumps(request))
-    events = []
+    events, end_s = [], time.monotonic() + PATIENCE_S  # frames come all the time
     while len(events) < answers if error is None else not any(error in e.get("error", "") for e in events):
-        message = await asyncio.wait_for(socket.read_message(), PATIENCE_S)
+        message = await asyncio.wait_for(socket.read_message(), end_s - time.monotonic())
         if message is None:
             return socket.close_code
         if isinstance(message, str) and "beat" not in json.loads(message):
