@@ -142,6 +142,19 @@ TEST(Margins, ACrossingMayBeAPointOfTheCurve) {
   EXPECT_EQ(at_the_limit.gain_down_dB, 0.0);
 }
 
+TEST(Margins, ASegmentThatEndsBeforeZeroCounts) {
+  const Complex before = -std::polar(2.0, -0.5), behind = -std::polar(0.5, -0.5);
+  EXPECT_NEAR(margins({-2.0, -1.0, 1.0}, {before, behind, behind}, 0.0).phase_deg, 0.5 * 90.0 / kHalfPi,
+              1e-9);
+}
+
+TEST(Margins, AGainThatMayFallByHalfADecibelSaysNothingOfItsRise) {
+  const double size = std::pow(10.0, 0.5 / 20.0);
+  const Margins m = margins({1.0, 2.0}, {-std::polar(size, 0.1), -std::polar(size, -0.1)}, 0.0);
+  EXPECT_NEAR(m.gain_down_dB, -0.5, 1e-9);
+  EXPECT_TRUE(std::isinf(m.gain_up_dB));
+}
+
 /// Half of the way in size, in angle and in frequency.
 TEST(Margins, BetweenTwoPointsTheCurveIsFollowed) {
   const Margins m = margins({1.0, 3.0}, {-std::polar(2.0, 0.25), -std::polar(0.5, 0.75)}, 0.0);

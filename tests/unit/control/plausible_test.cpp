@@ -86,6 +86,14 @@ TEST(WithoutMargin, AGainOnTheInputBeforeIsPartOfTheLoop) {
   EXPECT_FALSE(without_margin(late, K));
 }
 
+/// At a radian a tick 90 - 29 degrees of the integrator and 12 of 1 / (1 + 0.3 / z), less 25.
+TEST(WithoutMargin, AGainOnTheInputBeforeLeads) {
+  const SampledSystem loop{CMatrix::Ones(1, 1), CMatrix::Constant(1, 1, kTickS), CMatrix::Zero(1, 1)};
+  CMatrix K = CMatrix::Constant(1, 2, 0.3);
+  K(0, 0) = std::polar(1.189 * 2.0 * std::sin(0.5) / kTickS, -25.0 * std::acos(-1.0) / 180.0);
+  EXPECT_FALSE(without_margin(loop, K));
+}
+
 TEST(WithoutMargin, WhatIsNotStableHasNone) {
   const auto problem = integrator(3.0, 80.0);
   ASSERT_TRUE(problem);
@@ -99,6 +107,7 @@ TEST(WithoutMargin, WhatIsNotStableHasNone) {
 TEST(TooFastForTheTick, IsAModeBeyondOnePerTick) {
   const auto decaying = [](double rate_1_s) { return CMatrix{{-rate_1_s, 1.0}, {0.0, -1.0}}; };
   EXPECT_FALSE(too_fast_for_the_tick("key", decaying(199.0)));
+  EXPECT_FALSE(too_fast_for_the_tick("key", CMatrix::Constant(1, 1, -0.5))) << "no mode is too slow";
   const auto problem = too_fast_for_the_tick("key", decaying(201.0));
   ASSERT_TRUE(problem);
   EXPECT_EQ(problem->parameter, "key");
