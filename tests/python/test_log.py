@@ -184,7 +184,7 @@ def test_what_is_no_log_is_refused_by_name(tmp_path, content, complaint):
 
 
 def test_false_headers_take_no_longer_than_the_file_is_long(tmp_path):
-    """Each claims 16 MB that are not there: read once for each, ten times as many took a hundred times as long."""
+    """Each claims 16 MB that are not there: read for each, ten times as many took a hundred times as long."""
 
     def took_s(count):
         path = small_log(tmp_path / "a.lcm")
