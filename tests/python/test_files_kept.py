@@ -15,6 +15,7 @@ from equipoise_tools.view import open_source
 import lcm
 
 PATIENCE_S = 60
+DEEP = '"\\""' + ".a" * 200_000 + " = 1\n"  # a key of so many tables, behind an escaped quote
 
 
 @pytest.fixture
@@ -245,8 +246,7 @@ def test_nothing_waits_for_a_pipe(do, root, tmp_path):
 
 def test_dots_without_end_are_refused(do, root, tmp_path):
     text = (root / "config/edumip.toml").read_text()
-    attack = 'a = "\\""' + ".a" * 200_000 + "\n"
-    (tmp_path / "deep.toml").write_text(attack + text)
+    (tmp_path / "deep.toml").write_text(DEEP + text)
     sim = ["sim", "--duration-s", "1", "--log", "off", "--config"]
     assert "dots in a line" in do(*sim, "deep.toml", status=2)
     with pytest.raises(UserError, match="dots in a line"):
@@ -259,7 +259,7 @@ def test_nor_are_those_of_a_hostile_log(do, log, tmp_path):
         data = event.data
         if event.channel == channels.RUN:
             message = equipoise.run_t.decode(data)
-            message.config_toml = 'a = "\\""' + ".a" * 200_000 + "\n" + message.config_toml
+            message.config_toml = DEEP + message.config_toml
             data = message.encode()
         hostile.write_event(event.timestamp, event.channel, data)
     hostile.close()
