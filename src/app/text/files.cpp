@@ -68,7 +68,7 @@ std::string printable(const std::string& text) {
   std::string out = text;
   for (std::size_t i = 0; i < out.size(); ++i) {
     const auto c = static_cast<unsigned char>(out[i]);
-    // U+0080 to U+009F, in two bytes, are what an escape begins in one.
+    // U+0080 to U+009F, two bytes of UTF-8: terminals obey them like escapes.
     const bool two = c == 0xC2 && i + 1 < out.size() && static_cast<unsigned char>(out[i + 1]) < 0xA0;
     if ((c < 0x20 && c != '\n' && c != '\t') || c == 0x7F || two) out[i] = '?';
     if (two) out[++i] = '?';
