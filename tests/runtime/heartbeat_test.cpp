@@ -15,7 +15,7 @@
 namespace equipoise {
 namespace {
 
-constexpr std::int64_t kTick_ns = 5'000'000;
+constexpr std::int64_t kBeat_ns = 5'000'000;
 
 /// What a descriptor is refused for; "": it is taken. The descriptor is closed.
 std::string complaint(int fd) {
@@ -167,7 +167,7 @@ TEST(SupervisorTest, WhereNothingIsWatchedNothingForbidsMotors) {
   runtime::Supervisor supervisor(runtime::Watched{});
   RawSample raw{};
   for (int tick = 1; tick <= 3; ++tick) {
-    raw.t_ns = tick * kTick_ns;
+    raw.t_ns = tick * kBeat_ns;
     EXPECT_EQ(supervisor.begin(raw.t_ns, raw), 0U);
     supervisor.end(true, 0);
   }
@@ -179,7 +179,7 @@ TEST(SupervisorTest, ADeadGuardForbidsMotors) {
   RawSample raw{};
   std::int64_t now = 1'000'000'000;
   const auto tick = [&](bool guard_lives) {
-    now += kTick_ns;
+    now += kBeat_ns;
     raw.t_ns = now;
     if (guard_lives) page.guard.fetch_add(2);
     const std::uint32_t reasons = supervisor.begin(now, raw);
@@ -205,7 +205,7 @@ TEST(SupervisorTest, ACutIsToldOnceAndOldOnesNever) {
   RawSample raw{};
   std::int64_t now = 1'000'000'000;
   const auto tick = [&] {
-    raw.t_ns = now += kTick_ns;
+    raw.t_ns = now += kBeat_ns;
     page.guard.fetch_add(1);
     const std::uint32_t reasons = supervisor.begin(now, raw);
     supervisor.end(false, 0);
@@ -223,7 +223,7 @@ TEST(SupervisorTest, AFailedWriteIsForgottenWhenTheNextSucceeds) {
   RawSample raw{};
   std::int64_t now = 0;
   const auto tick = [&](int error) {
-    raw.t_ns = now += kTick_ns;
+    raw.t_ns = now += kBeat_ns;
     const std::uint32_t reasons = supervisor.begin(now, raw);
     supervisor.end(true, error);
     return reasons;
@@ -236,11 +236,11 @@ TEST(SupervisorTest, AFailedWriteIsForgottenWhenTheNextSucceeds) {
 TEST(SupervisorTest, AFailedWriteForbidsMotors) {
   runtime::Supervisor supervisor({nullptr, kRealtimeMissing, nullptr, false});
   RawSample raw{};
-  raw.t_ns = kTick_ns;
-  EXPECT_EQ(supervisor.begin(kTick_ns, raw), kRealtimeMissing);
+  raw.t_ns = kBeat_ns;
+  EXPECT_EQ(supervisor.begin(kBeat_ns, raw), kRealtimeMissing);
   supervisor.end(false, -EIO);
-  raw.t_ns = 2 * kTick_ns;
-  EXPECT_EQ(supervisor.begin(2 * kTick_ns, raw), kRealtimeMissing | kWriteFailed);
+  raw.t_ns = 2 * kBeat_ns;
+  EXPECT_EQ(supervisor.begin(2 * kBeat_ns, raw), kRealtimeMissing | kWriteFailed);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace equipoise {
 namespace {
 
-constexpr int kSeeds = 20;
+constexpr int kMipSeeds = 20;
 const std::string kMip = std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml";
 
 app::SimSummary run(const std::string& controller, double yaw_rate_rad_s, std::uint64_t seed,
@@ -34,7 +34,7 @@ class MipBalance : public testing::TestWithParam<Case> {};
 
 TEST_P(MipBalance, HoldsAMinuteForEverySeed) {
   const auto& [controller, bridge, yaw_rate] = GetParam();
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= kMipSeeds; ++seed) {
     const app::SimSummary s =
         run(controller, yaw_rate, seed, 60.0, {"world.nominal.bridge=" + std::string(bridge)});
     EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s, reasons "

@@ -89,7 +89,7 @@ void expect_same(const rio_sensors_t& a, const rio_sensors_t& b, const std::stri
 }
 
 /// `spoils`: what the fault makes of the sound sample of tick n, its `age`-th, the first being 1.
-struct Row {
+struct Corruption {
   FaultKind kind;
   std::function<void(rio_sensors_t& s, int n, int age)> spoils;
 };
@@ -110,7 +110,7 @@ void imu_of(rio_sensors_t& s, int n) {
 }
 
 using S = rio_sensors_t;
-const Row kRows[] = {
+const Corruption kCorruptions[] = {
     {FaultKind::kImuOff, [](S& s, int, int) { no_imu(s); }},
     {FaultKind::kImuGap, [](S& s, int, int) { no_imu(s); }},
     {FaultKind::kAllGap, [](S& s, int, int) { no_imu(s), s.valid = 0; }},
@@ -161,7 +161,7 @@ const Row kRows[] = {
 };
 
 TEST(FaultBackend, SpoilsOfASampleWhatItsRowSaysAndNothingElse) {
-  for (const Row& row : kRows) {
+  for (const Corruption& row : kCorruptions) {
     Broken b(row.kind, 30);
     const std::string name = kFaults[static_cast<std::size_t>(row.kind)].name;
     for (int age = 1; age <= 30; ++age) {

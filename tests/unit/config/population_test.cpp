@@ -11,7 +11,7 @@
 namespace equipoise {
 namespace {
 
-const std::string kMbbr = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
+const std::string kMbbrFile = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
 
 double value_of(const std::vector<config::Drawn>& drawn, const std::string& key, std::size_t i = 0) {
   for (const config::Drawn& d : drawn) {
@@ -41,7 +41,7 @@ TEST(Population, RobotsDifferAndLieInTheirRanges) {
   double highest = 0.0;
   double lowest = 10.0;
   for (int robot = 1; robot <= 100; ++robot) {
-    const auto drawn = config::draw_robot(kMbbr, {}, "full", robot);
+    const auto drawn = config::draw_robot(kMbbrFile, {}, "full", robot);
     const double ratio = value_of(drawn, "disturbance.static_ratio");
     seen.insert(ratio);
     highest = std::max(highest, ratio);
@@ -57,10 +57,10 @@ TEST(Population, RobotsDifferAndLieInTheirRanges) {
 }
 
 TEST(Population, TheWorldIsTheDrawnRobotAndTheFirmwareIsNot) {
-  const auto drawn = config::draw_robot(kMbbr, {}, "full", 3);
+  const auto drawn = config::draw_robot(kMbbrFile, {}, "full", 3);
   const MbbrConfig c =
-      load_mbbr(kMbbr, config::with_robot_drawn(drawn, "full", {"world.full.battery_V=7.77"})).config;
-  const MbbrConfig plain = load_mbbr(kMbbr, {}).config;
+      load_mbbr(kMbbrFile, config::with_robot_drawn(drawn, "full", {"world.full.battery_V=7.77"})).config;
+  const MbbrConfig plain = load_mbbr(kMbbrFile, {}).config;
   const auto full = static_cast<std::size_t>(Fidelity::kFull);
   EXPECT_EQ(c.world[full].common.stiction.static_ratio, value_of(drawn, "disturbance.static_ratio"));
   EXPECT_EQ(c.world[full].common.actual.body_mass, value_of(drawn, "actual.body_mass_scale"));
@@ -68,13 +68,13 @@ TEST(Population, TheWorldIsTheDrawnRobotAndTheFirmwareIsNot) {
             value_of(drawn, "disturbance.imu_misalignment_rad", 1));
   EXPECT_EQ(c.world[full].common.battery_V, 7.77);  // what is asked for has the last word
   EXPECT_EQ(c.robot.m_t, plain.robot.m_t);
-  EXPECT_TRUE(config::draw_robot(kMbbr, {}, "full", 0).empty());
+  EXPECT_TRUE(config::draw_robot(kMbbrFile, {}, "full", 0).empty());
 }
 
 TEST(Population, RefusesAKeyThatTheWorldLacksAndAnEmptyRange) {
-  EXPECT_THROW(config::draw_robot(kMbbr, {}, "thesis", 1), ConfigError);  // no disturbances there
-  EXPECT_THROW(config::draw_robot(kMbbr, {"population.battery_V=[8.0, 7.0]"}, "full", 1), ConfigError);
-  EXPECT_THROW(config::draw_robot(kMbbr, {"population.battery_V={sigma=-1.0}"}, "full", 1), ConfigError);
+  EXPECT_THROW(config::draw_robot(kMbbrFile, {}, "thesis", 1), ConfigError);  // no disturbances there
+  EXPECT_THROW(config::draw_robot(kMbbrFile, {"population.battery_V=[8.0, 7.0]"}, "full", 1), ConfigError);
+  EXPECT_THROW(config::draw_robot(kMbbrFile, {"population.battery_V={sigma=-1.0}"}, "full", 1), ConfigError);
 }
 
 }  // namespace

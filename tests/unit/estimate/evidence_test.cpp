@@ -14,7 +14,7 @@ namespace {
 
 using Sample = Mbbr::Sample;
 
-Sample at_rest() {
+Sample standing() {
   Sample z;
   z.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
   z.wheel_angle_rad = Vec3(1.0, 2.0, 3.0);
@@ -43,7 +43,7 @@ TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
-  const Sample z = at_rest();
+  const Sample z = standing();
   const double as_expected = evidence.expect(filter, z, z);
   // The model's error of two sigma: 0.5 of a squared normal number in place of four.
   filter.innovation[3] = 0.02;
@@ -60,7 +60,7 @@ TEST(Evidence, AWheelThatTurnsAnyhowIsNoFault) {
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
-  const Sample before = at_rest();
+  const Sample before = standing();
   evidence.hear(before);
   Sample turned = before;
   turned.wheel_angle_rad(0) += 0.1;
@@ -81,7 +81,7 @@ TEST(Evidence, AnEncoderThatStandsIsDeadIfItsWheelTurns) {
   Told filter;
   filter.variance.fill(1e-4);
   filter.innovation[3] = 0.03;
-  const Sample z = at_rest();
+  const Sample z = standing();
   Sample without = z;
   without.wheel_ok[0] = false;
   const auto faulty = [&] {
@@ -103,7 +103,7 @@ TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
   evidence.reset(0.0);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> share(0.0, 1.0);
-  const Sample all = at_rest();
+  const Sample all = standing();
   for (int k = 0; k < 20000; ++k) {
     Told everything, less;
     Sample some = all;
@@ -130,7 +130,7 @@ TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
   evidence.reset(0.0);
   std::mt19937 random(4);
   std::uniform_real_distribution<double> share(0.0, 1.0);
-  const Sample all = at_rest();
+  const Sample all = standing();
   for (int k = 0; k < 20000; ++k) {
     Told everything, noisy;
     for (std::size_t row = 0; row < 8; ++row) {
@@ -149,7 +149,7 @@ TEST(Evidence, OneLogarithmSaysAsMuchAsOneForEachRow) {
   evidence.reset(0.0);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0.0, 1.0);
-  const Sample z = at_rest();
+  const Sample z = standing();
   for (int k = 0; k < 20000; ++k) {
     Told filter;
     for (std::size_t row = 0; row < 8; ++row) {
@@ -166,7 +166,7 @@ TEST(Evidence, KnowsWhenTheFilterHasBecomeLessSure) {
   evidence.reset(0.0);
   Told filter;
   filter.variance.fill(1e-4);
-  const Sample z = at_rest();
+  const Sample z = standing();
   evidence.expect(filter, z, z);
   evidence.expect(filter, z, z);
   EXPECT_FALSE(evidence.knows_less());
@@ -190,7 +190,7 @@ TEST(Evidence, AGyroThatShakesIsBelievedLess) {
   filter.variance.fill(1e-6);
   for (int i = 0; i < 4000; ++i) {
     for (std::size_t axis = 0; axis < 3; ++axis) filter.innovation[axis] = shakes(random);
-    evidence.learn_vibration(filter, at_rest());
+    evidence.learn_vibration(filter, standing());
   }
   EXPECT_NEAR(evidence.vibration_rad_s(), 0.05, 0.015);
   EXPECT_NEAR(std::sqrt(evidence.spread(filter, 0)) / 2.0, evidence.vibration_rad_s(), 1e-9);
@@ -204,7 +204,7 @@ TEST(Evidence, WhatIsOffForLongIsNoVibration) {
   filter.variance.fill(1e-6);
   for (int i = 0; i < 400; ++i) {  // a bias that ramps
     for (std::size_t axis = 0; axis < 3; ++axis) filter.innovation[axis] = 0.001 * i;
-    evidence.learn_vibration(filter, at_rest());
+    evidence.learn_vibration(filter, standing());
   }
   EXPECT_LT(evidence.vibration_rad_s(), 0.002);
 }
@@ -214,7 +214,7 @@ TEST(Evidence, ASpikeIsNoJump) {
   evidence.reset(0.05);
   Told filter;
   filter.variance.fill(1e-6);
-  const Sample z = at_rest();
+  const Sample z = standing();
   evidence.expect(filter, z, z);
   const auto says = [&] { return evidence.jump(filter, z, 0.3); };
   filter.innovation[0] = 0.6;  // six sigma: one sample in twenty is an outlier

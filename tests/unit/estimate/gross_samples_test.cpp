@@ -9,7 +9,7 @@
 namespace equipoise {
 namespace {
 
-Mbbr::Sample at_rest() {
+Mbbr::Sample mbbr_sample() {
   Mbbr::Sample z;
   z.accel_B_m_s2.z() = -kGravity_m_s2;
   z.gyro_B_rad_s = Vec3(0.1, 0.2, 0.3);
@@ -17,7 +17,7 @@ Mbbr::Sample at_rest() {
   return z;
 }
 
-Mip::Sample still() {
+Mip::Sample mip_sample() {
   Mip::Sample z;
   z.imu_ok = true;
   z.accel_B_m_s2.z() = -kGravity_m_s2;
@@ -26,7 +26,7 @@ Mip::Sample still() {
 
 TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
   GrossSamples gross({true, true, false}, 0.0);
-  const Mbbr::Sample z = at_rest();
+  const Mbbr::Sample z = mbbr_sample();
   Mbbr::Sample odd = z;
   odd.gyro_B_rad_s.z() += 3.1;
   EXPECT_TRUE(gross.without(z, z.gyro_B_rad_s).imu_ok);
@@ -45,7 +45,7 @@ TEST(GrossSamples, AGlitchIsNotUsedThreeAreNoGlitch) {
 
 TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
   GrossSamples gross({true, false, false}, 2.0 * kPi);
-  Mip::Sample z = still();
+  Mip::Sample z = mip_sample();
   z.gyro_B_rad_s.y() = 5.0;
   for (int i = 0; i < 20; ++i) {
     const Mip::Sample used = gross.without(z, Vec3::Zero());
@@ -57,7 +57,7 @@ TEST(GrossSamples, ARobotOnTwoWheelsMayRockAsFastAsItWill) {
 
 TEST(GrossSamples, ABlowLeavesOutNoAxisOfTheGyro) {
   GrossSamples gross({true, false, false}, 2.0 * kPi);
-  Mip::Sample z = still();
+  Mip::Sample z = mip_sample();
   z.accel_B_m_s2 *= 6.0;
   for (int i = 0; i < 10; ++i) EXPECT_EQ(gross.without(z, Vec3::Zero()).imu_ok, i >= 3);
   EXPECT_FALSE(gross.left_out());
@@ -66,7 +66,7 @@ TEST(GrossSamples, ABlowLeavesOutNoAxisOfTheGyro) {
 
 TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
   GrossSamples gross({true, true, false}, 0.0);
-  Mbbr::Sample z = at_rest();
+  Mbbr::Sample z = mbbr_sample();
   z.gyro_axis_ok[1] = false;
   for (int i = 0; i < 10; ++i) gross.without(z, z.gyro_B_rad_s + Vec3(0.0, 0.04, 0.0));
   EXPECT_FALSE(gross.left_out());
@@ -77,7 +77,7 @@ TEST(GrossSamples, AnAxisThatRepeatsItsCountsIsDeadWhereTheBodyTurns) {
 
 TEST(GrossSamples, ARobotThatStandsWithoutADeadAxisGoesOnUnlessItTurnsFast) {
   GrossSamples gross({true, false, false}, 2.0 * kPi);
-  Mip::Sample z = still();
+  Mip::Sample z = mip_sample();
   z.gyro_axis_ok[0] = false;
   for (const double turns_rad_s : {0.0, 6.0, -6.0}) {
     z.gyro_B_rad_s.z() = turns_rad_s;

@@ -227,25 +227,25 @@ TYPED_TEST(PackedFilterTest, GivesTheLikelihoodOfTheSamplesBeforeItCorrects) {
   EXPECT_EQ(filter.x(), x);
   EXPECT_EQ(filter.P(), P);
 
-  Mat<kRows, kRows> S = H * P * H.transpose();
+  Eigen::MatrixXd S = H * P * H.transpose();  // of no fixed size: such decompositions compile once
   S.diagonal() += R;
-  const Eigen::Matrix<double, kUsed, kUsed> of_used = S.template topLeftCorner<kUsed, kUsed>();
-  const Vec<kUsed> weighted = of_used.ldlt().solve(nu.template head<kUsed>());
+  const Eigen::LDLT<Eigen::MatrixXd> of_used(S.topLeftCorner(kUsed, kUsed));
+  const Eigen::VectorXd weighted = of_used.solve(nu.head(kUsed));
   double product = 1.0;
   double sum = 0.0;
   for (std::size_t i = 0; i < kUsed; ++i) {
     product *= filter.row_variance()[i];
     sum += filter.row_innovation()[i] * filter.row_innovation()[i] / filter.row_variance()[i];
   }
-  EXPECT_NEAR(product / of_used.determinant(), 1.0, 1e-9);
-  EXPECT_NEAR(sum / nu.template head<kUsed>().dot(weighted), 1.0, 1e-9);
+  EXPECT_NEAR(product / of_used.vectorD().prod(), 1.0, 1e-9);
+  EXPECT_NEAR(sum / nu.head(kUsed).dot(weighted), 1.0, 1e-9);
   // The row that does not count: what the others leave open of it.
-  const Vec<kUsed> across = S.template topRightCorner<kUsed, 1>();
+  const Eigen::VectorXd across = S.topRightCorner(kUsed, 1);
   EXPECT_NEAR(filter.row_innovation()[kUsed], nu(kUsed) - across.dot(weighted), 1e-9);
-  EXPECT_NEAR(filter.row_variance()[kUsed] / (S(kUsed, kUsed) - across.dot(of_used.ldlt().solve(across))),
-              1.0, 1e-9);
+  EXPECT_NEAR(filter.row_variance()[kUsed] / (S(kUsed, kUsed) - across.dot(of_used.solve(across))), 1.0,
+              1e-9);
   filter.correct();
-  const Vec<kStates> gained = P * H.template topRows<kUsed>().transpose() * weighted;
+  const Vec<kStates> gained = P * H.topRows(kUsed).transpose() * weighted;
   EXPECT_LT((filter.x() - x - gained).norm(), 1e-9 * gained.norm());
 }
 

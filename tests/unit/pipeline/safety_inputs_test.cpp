@@ -5,17 +5,15 @@
 #include <limits>
 
 #include "unit/pipeline/bench.hpp"
+#include "unit/pipeline/pairs.hpp"
 
 namespace equipoise {
 namespace {
 
 using bench::Bench;
+using bench::list;
+using bench::near;
 using Health = EstimatorHealth<2>;
-using testing::DoubleNear;
-using testing::ElementsAre;
-
-std::vector<double> list(const Vec<2>& v) { return {v(0), v(1)}; }
-auto near(double a, double b) { return ElementsAre(DoubleNear(a, 1e-12), DoubleNear(b, 1e-12)); }
 
 /// Reasons after so many ticks of an armed robot with this health.
 std::uint32_t reasons_with(const Health& health, int ticks = 1) {

@@ -5,18 +5,19 @@
 
 #include "equipoise/pipeline.hpp"
 #include "unit/pipeline/bench.hpp"
+#include "unit/pipeline/pairs.hpp"
 
 namespace equipoise {
 namespace {
 
 using bench::Bench;
+using bench::list;
+using bench::near;
 using testing::DoubleNear;
 using testing::ElementsAre;
 
 constexpr double kNoLoad_rad_s = 80.0;  // of the bench's motors at 8 V
 
-std::vector<double> list(const Vec<2>& v) { return {v(0), v(1)}; }
-auto near(double a, double b) { return ElementsAre(DoubleNear(a, 1e-12), DoubleNear(b, 1e-12)); }
 std::vector<double> duties(const MotorCommand& m) { return {m.duty[0], m.duty[1]}; }
 
 /// Both wheels turn with 20 rad/s.

@@ -3,18 +3,11 @@
 
 #include "equipoise/plant/integrator.hpp"
 #include "robots/mbbr/config.hpp"
-#include "robots/mbbr/world.hpp"
 #include "robots/mip/world.hpp"
+#include "unit/plant/level_world.hpp"
 
 namespace equipoise {
 namespace {
-
-MbbrWorldParams quiet() {
-  MbbrWorldParams w;
-  w.common.initial_tilt_rad = 0.0;
-  w.common.friction = false;
-  return w;
-}
 
 MotorParameters linear_motor() {
   MotorParameters m;
@@ -24,7 +17,7 @@ MotorParameters linear_motor() {
 
 /// Yaw rate after `ticks` of equal duties.
 double spin_rad_s(const ActualScales& actual, int ticks) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world_without_friction();
   w.common.actual = actual;
   MbbrWorld world(MbbrParameters(), linear_motor(), Calibration(), w);
   MotorCommand command{};

@@ -1,17 +1,11 @@
 // Effects that sensors, motors and loop of any robot have, each alone and against its formula.
 #include <gtest/gtest.h>
 
-#include "robots/mbbr/world.hpp"
 #include "robots/mip/world.hpp"
+#include "unit/plant/level_world.hpp"
 
 namespace equipoise {
 namespace {
-
-MbbrWorldParams quiet() {
-  MbbrWorldParams w;
-  w.common.initial_tilt_rad = 0.0;
-  return w;
-}
 
 MbbrWorld world_of(const MbbrWorldParams& p) {
   return {MbbrParameters{}, MotorParameters{}, Calibration{}, p};
@@ -25,7 +19,7 @@ MotorCommand with_duty(double duty) {
 }
 
 TEST(Sensors, ScaleErrorOfTheAccelerometerIsAFactor) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   const RawSample plain = world_of(w).sense();
   w.common.accel_scale_error = Vec3(0.0, 0.0, 0.03);
   EXPECT_NEAR(world_of(w).sense().accel_counts[2], 1.03 * plain.accel_counts[2], 1e-9);
@@ -34,7 +28,7 @@ TEST(Sensors, ScaleErrorOfTheAccelerometerIsAFactor) {
 TEST(Sensors, GyroBiasFollowsTheTemperature) {
   // 0.24 deg/s per kelvin, 5 K above the calibration and 3 K more in the end.
   constexpr double kDrift = 0.24 * kPi / 180.0;
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.gyro_drift_rad_s_K = Vec3(0.0, 0.0, kDrift);
   w.common.warm_K = 5.0;
   w.common.warm_up_K = 3.0;
@@ -47,7 +41,7 @@ TEST(Sensors, GyroBiasFollowsTheTemperature) {
 }
 
 TEST(Sensors, AnImuWithASlowerClockRepeatsThatShare) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.imu_repeat_share = 0.05;
   w.common.gyro_sigma_rad_s = 0.01;
   MbbrWorld world = world_of(w);
@@ -66,7 +60,7 @@ TEST(Sensors, AnImuWithASlowerClockRepeatsThatShare) {
 }
 
 TEST(Sensors, AMassCentreOffTheAxisIsAMountThatTheWheelsShare) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.com_offset_rad = Vec2(0.03, 0.0);
   const RawSample raw = world_of(w).sense();
   // The chassis hangs over by that about x: gravity shows in its y axis.
@@ -90,7 +84,7 @@ TEST(Motors, ABridgeThatSwitchesOnLateLosesDuty) {
   EXPECT_DOUBLE_EQ(switched_duty(-0.5, 10e-6 * 20e3), -0.3);
   EXPECT_DOUBLE_EQ(switched_duty(0.1, 0.2), 0.0);
   EXPECT_DOUBLE_EQ(switched_duty(1.0, 0.2), 1.0);  // nothing switches
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   const auto turned = [](const MbbrWorldParams& p, double duty) {
     MbbrWorld world = world_of(p);
     for (int i = 0; i < 20; ++i) world.advance(with_duty(duty));
@@ -114,7 +108,7 @@ TEST(Friction, ChangesFromItsStartToItsEnd) {
   brake.bridge = BridgeType::kDriveBrake;
   const double duty = 1.5 * robot.mu_c / (robot.r / robot.r_w * std::sqrt(3.0) * brake.k1());
   const auto turned = [&](double scale) {
-    MbbrWorldParams w = quiet();
+    MbbrWorldParams w = level_world();
     w.common.friction_scale = Vec2::Constant(scale);
     MbbrWorld world(robot, brake, Calibration(), w);
     for (int i = 0; i < 40; ++i) world.advance(with_duty(duty));
@@ -125,7 +119,7 @@ TEST(Friction, ChangesFromItsStartToItsEnd) {
 }
 
 TEST(Loop, MissesThatShareOfItsTicks) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.missed_tick_share = 0.1;
   MbbrWorld world = world_of(w);
   for (int i = 0; i < 2000; ++i) world.advance(MotorCommand{});

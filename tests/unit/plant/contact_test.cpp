@@ -1,18 +1,12 @@
 // What contacts carry: the ball on the floor, the wheels on the ball; and what else a built robot has.
 #include <gtest/gtest.h>
 
-#include "robots/mbbr/world.hpp"
 #include "robots/mip/world.hpp"
 #include "support/oracle.hpp"
+#include "unit/plant/level_world.hpp"
 
 namespace equipoise {
 namespace {
-
-MbbrWorldParams quiet() {
-  MbbrWorldParams w;
-  w.common.initial_tilt_rad = 0.0;
-  return w;
-}
 
 class World {
  public:
@@ -70,7 +64,7 @@ TEST(SlippingBall, AtRestTheFloorCarriesTheWeightAndNothingElse) {
 }
 
 TEST(SlippingBall, AGripThatIsNeverExceededChangesNothing) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   World held(w);
   w.floor = {5.0, 0.1};
   World gripped(w);
@@ -82,7 +76,7 @@ TEST(SlippingBall, AGripThatIsNeverExceededChangesNothing) {
 }
 
 TEST(SlippingBall, OnIceTheBallTurnsAndTheRobotStaysWhereItIs) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.friction = false;
   World rough(w);
   w.floor = {1e-6, 1e-6};
@@ -102,7 +96,7 @@ TEST(SlippingBall, OnIceTheBallTurnsAndTheRobotStaysWhereItIs) {
 }
 
 TEST(SlippingBall, AThinContactLetsTheBallSpinInsteadOfTheRobot) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   World held(w);
   w.floor = {0.6, 0.0005};
   World thin(w);
@@ -113,7 +107,7 @@ TEST(SlippingBall, AThinContactLetsTheBallSpinInsteadOfTheRobot) {
 }
 
 TEST(SlippingBall, AskedGentlyItRollsAgain) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.floor = {0.3, 0.001};
   World world(w);
   world.run(kSpin, 10);
@@ -212,7 +206,7 @@ TEST(Contacts, MoveTheRobotAsBodiesThatTouchDoInMuJoCo) {
   MotorParameters motor;
   motor.bridge = BridgeType::kDriveBrake;
   for (const auto& row : test::oracle_rows("mbbr_contacts")) {
-    MbbrWorldParams p = quiet();
+    MbbrWorldParams p = level_world();
     p.common.friction = false;
     p.common.battery_V = 8.0;
     p.drive.wheel_grip = row.at("wheel_grip");
@@ -243,7 +237,7 @@ TEST(Contacts, MoveTheRobotAsBodiesThatTouchDoInMuJoCo) {
 }
 
 TEST(Gyro, ScaleErrorAndWarmingUpAddToWhatItFeels) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   World plain(w);
   plain.run(kSpin, 20);
   w.common.gyro_scale_error = Vec3(0.0, 0.0, 0.01);

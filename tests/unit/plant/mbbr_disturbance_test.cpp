@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "equipoise/plant/switched_motor.hpp"
-#include "robots/mbbr/world.hpp"
 #include "support/assign.hpp"
+#include "unit/plant/level_world.hpp"
 
 namespace equipoise {
 namespace {
@@ -12,12 +12,6 @@ namespace {
 using Duties = std::array<double, 3>;
 constexpr Duties kSpin{0.9, 0.9, 0.9};
 constexpr Duties kTip{0.95, -0.8, 0.7};
-
-MbbrWorldParams quiet() {
-  MbbrWorldParams w;
-  w.common.initial_tilt_rad = 0.0;
-  return w;
-}
 
 /// A world with the motors on at these duties for `ticks`.
 class World {
@@ -59,7 +53,7 @@ TEST(MbbrDisturbance, StictionHoldsWhatCoulombFrictionLetsGo) {
   // Spinning up needs more than mu_c / ratio per wheel: 1.2 times Coulomb, below 1.5 times.
   const MbbrParameters robot;
   const MotorParameters motor;
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   MotorParameters brake = motor;
   brake.bridge = BridgeType::kDriveBrake;
   const double duty = 1.2 * robot.mu_c / (robot.r / robot.r_w * std::sqrt(3.0) * motor.k1());
@@ -85,7 +79,7 @@ TEST(MbbrDisturbance, StictionIsGoneWhenMoving) {
 }
 
 TEST(MbbrDisturbance, YawFrictionDependsOnTheDirectionOfSpin) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   EXPECT_NEAR(spin_after(w, 1.0), spin_after(w, -1.0), 1e-9);
   w.yaw_friction_scale = Vec2(1.3, 0.7);  // ball about body z: positive duties turn it positively
   EXPECT_LT(spin_after(w, 1.0), 0.98 * spin_after(w, -1.0));
@@ -119,7 +113,7 @@ TEST(MbbrDisturbance, DiodeDropMatchesTheSwitchingMotor) {
 }
 
 TEST(MbbrDisturbance, DiodeDropTakesTorqueFromPartialDuty) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.friction = false;
   const double plain = std::abs(World(w).run({0.5, 0.5, 0.5}, 20).truth().theta_z);
   w.common.diode_drop_V = 0.7;
@@ -166,7 +160,7 @@ TEST(MbbrDisturbance, BacklashPassesNothingUntilTheGapIsCrossed) {
 }
 
 TEST(MbbrDisturbance, BacklashDelaysTheStartAndTheEncodersSeeTheMotor) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   const double plain = std::abs(World(w).run(kSpin, 2).truth().theta_z);
   w.drive.gear.play_rad = 0.1;
   World world(w);
@@ -184,7 +178,7 @@ TEST(MbbrDisturbance, GripIsFrictionUnderALoadThatTheLatitudeMultiplies) {
 }
 
 TEST(MbbrDisturbance, SlippingWheelsReportMoreThanTheBallTurned) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   World grips(w);
   grips.run(kSpin, 10);
   EXPECT_NEAR(grips.seen_spin_rad(), -grips.truth().theta_z, 1e-9);
@@ -196,7 +190,7 @@ TEST(MbbrDisturbance, SlippingWheelsReportMoreThanTheBallTurned) {
 }
 
 TEST(MbbrDisturbance, APushMovesTheRobotAndTheAccelerometerFeelsIt) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.friction = false;
   w.common.pushes.push_back({0.0, 0.02, Vec2(2.0, 0.0)});
   World world(w);
@@ -207,7 +201,7 @@ TEST(MbbrDisturbance, APushMovesTheRobotAndTheAccelerometerFeelsIt) {
 }
 
 TEST(MbbrDisturbance, AMisalignedImuSeesYawAsTiltingAndUprightAsTilted) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.imu_misalignment_rad = Vec3(0.05, 0.0, 0.0);
   World world(w);
   world.run(kSpin, 20);
@@ -221,7 +215,7 @@ TEST(MbbrDisturbance, AMisalignedImuSeesYawAsTiltingAndUprightAsTilted) {
 }
 
 TEST(MbbrDisturbance, ImuBiasIsConstantAndItsRangeClips) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.gyro_bias_sigma_rad_s = 0.1;
   World biased(w);
   biased.run({0.0, 0.0, 0.0}, 1);
@@ -241,7 +235,7 @@ TEST(MbbrDisturbance, ImuBiasIsConstantAndItsRangeClips) {
 }
 
 TEST(MbbrDisturbance, LatenciesDelayWhatTheyName) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   World prompt(w);
   w.common.sensor_latency_ticks = 2;
   World late(w);
@@ -250,14 +244,14 @@ TEST(MbbrDisturbance, LatenciesDelayWhatTheyName) {
   EXPECT_THAT(prompt.raw().encoder_counts, testing::ElementsAreArray(late.raw().encoder_counts));
   EXPECT_EQ(prompt.raw().t_ns + 10'000'000, late.raw().t_ns);
 
-  MbbrWorldParams slow = quiet();
+  MbbrWorldParams slow = level_world();
   slow.common.actuation_latency_steps = 3;
   EXPECT_LT(World(slow).run(kTip, 1).truth().phi.norm(),
-            0.5 * World(quiet()).run(kTip, 1).truth().phi.norm());
+            0.5 * World(level_world()).run(kTip, 1).truth().phi.norm());
 }
 
 TEST(MbbrDisturbance, TheSameSeedGivesTheSameNumbers) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world();
   w.common.gyro_sigma_rad_s = 0.001;
   w.drive.roller_tilt_rad = 0.1;
   w.drive.gear.play_rad = 0.02;

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "equipoise/plant/delay_line.hpp"
-#include "robots/mbbr/world.hpp"
 #include "robots/mip/world.hpp"
+#include "unit/plant/level_world.hpp"
 
 namespace equipoise {
 namespace {
@@ -13,13 +13,6 @@ MotorCommand spinning() {
   command.enable = true;
   for (double& duty : command.duty) duty = 0.9;
   return command;
-}
-
-MbbrWorldParams quiet() {
-  MbbrWorldParams w;
-  w.common.initial_tilt_rad = 0.0;
-  w.common.friction = false;
-  return w;
 }
 
 /// The sample after `ticks` of spinning up.
@@ -87,11 +80,11 @@ TEST(DelayLine, IsLinearBetweenRecordsAndHoldsTheFirst) {
 }
 
 TEST(SensorAge, TheGyroIsLateByTheLowPassAndTheEncodersAreNot) {
-  const RawSample prompt = mbbr_sample(quiet(), 8);
-  MbbrWorldParams w = quiet();
+  const RawSample prompt = mbbr_sample(level_world_without_friction(), 8);
+  MbbrWorldParams w = level_world_without_friction();
   w.common.imu_low_pass = 2;
   const RawSample late = mbbr_sample(w, 8);
-  const RawSample before = mbbr_sample(quiet(), 7);
+  const RawSample before = mbbr_sample(level_world_without_friction(), 7);
   EXPECT_EQ(late.encoder_counts[0], prompt.encoder_counts[0]);
   EXPECT_EQ(late.t_ns, prompt.t_ns);
   // 3.9 of the tick's 5 ms back; the spin is nearly linear over one tick.
@@ -101,13 +94,13 @@ TEST(SensorAge, TheGyroIsLateByTheLowPassAndTheEncodersAreNot) {
 }
 
 TEST(SensorAge, SpreadAndSamplingInstantsAddToIt) {
-  MbbrWorldParams w = quiet();
+  MbbrWorldParams w = level_world_without_friction();
   w.common.imu_low_pass = 2;
   w.common.imu_delay_scale = 0.0;
   w.common.imu_sample_age_s = 5e-3;
   w.common.encoder_sample_age_s = 5e-3;
   const RawSample late = mbbr_sample(w, 8);
-  const RawSample before = mbbr_sample(quiet(), 7);
+  const RawSample before = mbbr_sample(level_world_without_friction(), 7);
   EXPECT_NEAR(late.gyro_counts[2], before.gyro_counts[2], 1e-6);
   EXPECT_NEAR(late.encoder_counts[1], before.encoder_counts[1], 1e-6);
   w.common.imu_delay_scale = 1.1;
@@ -139,7 +132,7 @@ TEST(SensorAge, TheEduMipsGyroIsLateToo) {
 
 TEST(ActuationDelay, AFractionOfATickLiesBetweenItsNeighbours) {
   const auto turned = [](double ticks, int steps) {
-    MbbrWorldParams w = quiet();
+    MbbrWorldParams w = level_world_without_friction();
     w.common.actuation_delay_ticks = ticks;
     w.common.actuation_latency_steps = steps;
     MbbrWorld world(MbbrParameters(), MotorParameters(), Calibration(), w);

@@ -10,7 +10,7 @@
 namespace equipoise {
 namespace {
 
-MbbrReferenceParams params() {
+MbbrReferenceParams mbbr_reference() {
   MbbrReferenceParams p;
   p.schedule.rows = 1;
   p.schedule.row[0] = {3.0, 0.5, 10.0};
@@ -36,7 +36,7 @@ MbbrReference after(MbbrReferenceStage* stage, const Command& command, int ticks
 
 /// At 90 degrees of heading, forward (+x) of the world is to the right (-y) of the robot.
 TEST(MbbrReference, FeedsForwardTheBallsAccelerationAndItsRateInTheYawFrame) {
-  MbbrReferenceStage stage(params());
+  MbbrReferenceStage stage(mbbr_reference());
   stage.reset(MbbrEstimate{});
   MbbrEstimate x;
   x.theta_z = kPi / 2.0;
@@ -51,7 +51,7 @@ TEST(MbbrReference, FeedsForwardTheBallsAccelerationAndItsRateInTheYawFrame) {
 }
 
 TEST(MbbrReference, GrowsByTheSmallerLimit) {
-  MbbrReferenceParams p = params();
+  MbbrReferenceParams p = mbbr_reference();
   p.max_jerk_m_s3 = std::numeric_limits<double>::infinity();
   p.feasible_acceleration_m_s2 = 0.2;
   p.floor_yaw_acceleration_rad_s2 = 1.0;
@@ -67,7 +67,7 @@ TEST(MbbrReference, GrowsByTheSmallerLimit) {
 
 /// Duty of a wheel: 0.5 may be used, 0.1 per rad/s of yaw, 2 per m/s.
 TEST(MbbrReference, TravelHasRoomBesideTheTurnThatIsThereAndTheOneThatIsWanted) {
-  MbbrReferenceParams p = params();
+  MbbrReferenceParams p = mbbr_reference();
   p.max_jerk_m_s3 = std::numeric_limits<double>::infinity();
   p.max_acceleration_m_s2 = 1e6;
   p.budget = {0.5, 0.0, 0.1, 2.0};
@@ -82,7 +82,7 @@ TEST(MbbrReference, TravelHasRoomBesideTheTurnThatIsThereAndTheOneThatIsWanted) 
 }
 
 TEST(MbbrReference, AResetForgetsTheMotion) {
-  MbbrReferenceStage moved(params());
+  MbbrReferenceStage moved(mbbr_reference());
   MbbrEstimate x;
   x.phi_dot_star = Vec2(-0.5, 0.25);
   x.omega_B = Vec3(0.1, 0.2, 0.3);
@@ -91,7 +91,7 @@ TEST(MbbrReference, AResetForgetsTheMotion) {
   now.phi = Vec2(4.0, 5.0);
   now.theta_z = 1.25;
   moved.reset(now);
-  MbbrReferenceStage fresh(params());
+  MbbrReferenceStage fresh(mbbr_reference());
   fresh.reset(now);
   for (int k = 0; k < 3; ++k) {
     const MbbrReference a = moved.update(Command{}, now);
@@ -107,7 +107,7 @@ TEST(MbbrReference, AResetForgetsTheMotion) {
 }
 
 TEST(MbbrReference, EulerRatesAreFedBackWhereTheyAreAskedFor) {
-  MbbrReferenceParams p = params();
+  MbbrReferenceParams p = mbbr_reference();
   p.rate_feedback = RateFeedback::kEuler;
   MbbrReferenceStage stage(p);
   stage.reset(MbbrEstimate{});

@@ -10,7 +10,7 @@
 namespace equipoise {
 namespace {
 
-MipReferenceParams params() {
+MipReferenceParams mip_reference() {
   MipReferenceParams p;
   p.max_acceleration_m_s2 = 0.5;
   p.max_jerk_m_s3 = 5.0;
@@ -44,7 +44,7 @@ struct Follower {
 
 TEST(MipReference, RollsAsFarAsItsWheelsTurnAndForwardIsMinusY) {
   for (const double speed : {0.2, -0.3}) {
-    Follower robot(params());
+    Follower robot(mip_reference());
     const MipReference at_speed = robot.after(command_of(speed, 0.0), 2.0);
     EXPECT_NEAR(at_speed.phi_dot, speed / 0.034, 1e-4);
     const MipReference later = robot.after(command_of(speed, 0.0), 1.0);
@@ -56,7 +56,7 @@ TEST(MipReference, RollsAsFarAsItsWheelsTurnAndForwardIsMinusY) {
 }
 
 TEST(MipReference, TurnsInACircleToTheLeft) {
-  Follower robot(params());
+  Follower robot(mip_reference());
   const Command command = command_of(0.2, 1.5);
   const MipReference a = robot.after(command, 2.0);
   EXPECT_NEAR(a.psi_dot, 1.5, 1e-12);
@@ -72,7 +72,7 @@ TEST(MipReference, TurnsInACircleToTheLeft) {
 
 TEST(MipReference, YawGrowsByItsLimitEitherWay) {
   for (const double sign : {1.0, -1.0}) {
-    Follower robot(params());
+    Follower robot(mip_reference());
     EXPECT_NEAR(robot.after(command_of(0.0, sign * 3.0), kTickS).psi_dot, sign * 4.0 * kTickS, 1e-12);
     const MipReference ref = robot.after(command_of(0.0, sign * 3.0), 0.5);
     EXPECT_NEAR(ref.psi_dot, sign * 4.0 * 0.505, 1e-9);
@@ -81,7 +81,7 @@ TEST(MipReference, YawGrowsByItsLimitEitherWay) {
 }
 
 TEST(MipReference, SpeedGrowsByTheSmallerLimit) {
-  MipReferenceParams p = params();
+  MipReferenceParams p = mip_reference();
   p.max_jerk_m_s3 = std::numeric_limits<double>::infinity();
   Follower robot(p);
   EXPECT_NEAR(0.034 * robot.after(command_of(0.4, 0.0), 0.5).phi_dot, 0.5 * 0.5, 1e-9);
@@ -92,7 +92,7 @@ TEST(MipReference, SpeedGrowsByTheSmallerLimit) {
 
 /// Duty of a wheel: 0.5 may be used, 0.1 per rad/s of yaw, 2 per m/s.
 TEST(MipReference, TravelGetsWhatTheTurnLeaves) {
-  MipReferenceParams p = params();
+  MipReferenceParams p = mip_reference();
   p.budget = {0.5, 0.0, 0.1, 2.0};
   EXPECT_NEAR(0.034 * Follower(p).after(command_of(1.0, 0.0), 5.0).phi_dot, 0.25, 1e-9);
   EXPECT_NEAR(0.034 * Follower(p).after(command_of(-1.0, -3.0), 5.0).phi_dot, -0.1, 1e-9);
@@ -106,7 +106,7 @@ TEST(MipReference, TravelGetsWhatTheTurnLeaves) {
 }
 
 TEST(MipReference, ErrorsAreReferenceMinusEstimate) {
-  MipReferenceStage stage(params());
+  MipReferenceStage stage(mip_reference());
   MipEstimate start;
   start.phi = 5.0;
   start.psi = -2.0;
@@ -151,7 +151,7 @@ TEST(MipReference, ItsViewIsWhereTheRobotShouldBe) {
 }
 
 TEST(MipReference, AResetForgetsTheMotion) {
-  Follower robot(params());
+  Follower robot(mip_reference());
   robot.after(command_of(0.3, 2.0), 3.0);
   robot.stage.reset(robot.x_hat);
   const MipReference ref = robot.after(Command{}, kTickS);

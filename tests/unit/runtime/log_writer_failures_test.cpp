@@ -118,7 +118,7 @@ TEST_F(LogWriterFailures, AWriteThatASignalInterruptsGoesOn) {
     }
     fcntl(reader, F_SETFL, 0);
     std::vector<char> some(65536);
-    for (ssize_t n = 0; (n = read(reader, some.data(), some.size())) > 0;)
+    for (ssize_t n = 0; (n = ::read(reader, some.data(), some.size())) > 0;)
       received.append(some.data(), static_cast<std::size_t>(n));
   });
   log.event(0, "C", data);
