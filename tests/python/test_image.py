@@ -86,8 +86,8 @@ def test_the_cards_own_module_list_does_not_hide_the_packages(root):
 
 @pytest.mark.cross
 def test_the_cards_initramfs_holds_what_its_tree_asks_for(root):
-    kernel = next((root / "build/vm/kernel/lib/modules").iterdir())
-    subprocess.run(["depmod", "-b", root / "build/vm/kernel", kernel.name], check=True)
+    kernel = next((root / "build/vm/kernel-armhf/lib/modules").iterdir())
+    subprocess.run(["depmod", "-b", root / "build/vm/kernel-armhf", kernel.name], check=True)
     modules = device_tree.drivers(
         device_tree.read(root / "build/vm/bookworm-boneblack.dtb"), (kernel / "modules.alias").read_text()
     )

@@ -1,22 +1,31 @@
-# Sourced after setup.sh, foreign_apt.sh and vm_machine.sh: a PREEMPT_RT armhf kernel from Debian for QEMU, and the modules it lacks.
+# Sourced after setup.sh, foreign_apt.sh and vm_machine.sh: a PREEMPT_RT kernel from Debian for QEMU, and the modules it lacks.
 # Everything lands in build/vm. Versions come from the archive, none is written here.
 # shellcheck shell=bash disable=SC2154
 
-kernel_tree=$vm/kernel # lib/modules/VERSION, boot/
-modules_built=$vm/modules
+# use_kernel ARCHITECTURE: armhf, which holds without a call, or arm64 (the processor is that of the AM62).
+use_kernel() {
+  kernel_for=$1
+  case $1 in
+  armhf) flavour=rt-armmp arch=arm triple=arm-linux-gnueabihf emulated=(qemu-system-arm -M "virt,highmem=off" -cpu cortex-a15) ;;
+  arm64) flavour=rt-arm64 arch=arm64 triple=aarch64-linux-gnu emulated=(qemu-system-aarch64 -M virt -cpu cortex-a53) ;;
+  esac
+  kernel_tree=$vm/kernel-$1 # lib/modules/VERSION, boot/
+  kernel_headers=$vm/headers-$1
+  modules_built=$vm/modules-$1
+}
+use_kernel armhf
 
 # prepare_kernel: sets kernel_version.
 prepare_kernel() {
-  local image stamp=$vm/kernel.stamp
+  local image version stamp=$kernel_tree.stamp debs=$vm/debs
   if [ ! -f "$stamp" ]; then
-    rm -rf "$vm/debs" "$kernel_tree" "$vm/headers"
-    image=$(package_of bookworm armhf linux-image-rt-armmp)
-    local version=${image#linux-image-} flavour
-    flavour=${version%-rt-armmp}
-    download_only armhf "$image" "linux-headers-$version" "linux-headers-$flavour-common-rt" busybox-static
+    rm -rf "$debs" "$kernel_tree" "$kernel_headers"
+    image=$(package_of bookworm "$kernel_for" "linux-image-$flavour")
+    version=${image#linux-image-}
+    download_only "$kernel_for" "$image" "linux-headers-$version" "linux-headers-${version%-"$flavour"}-common-rt" busybox-static
     download_only "$(dpkg --print-architecture)" linux-kbuild-6.1
-    unpack "$kernel_tree" "$vm/debs/${image}"_*.deb "$vm/debs"/busybox-static_*_armhf.deb
-    unpack "$vm/headers" "$vm/debs"/linux-headers-*.deb "$vm/debs"/linux-kbuild-*.deb
+    unpack "$kernel_tree" "$debs/${image}"_*.deb "$debs"/busybox-static_*.deb
+    unpack "$kernel_headers" "$debs"/linux-headers-*.deb "$debs"/linux-kbuild-*.deb
     printf '%s\n' "$version" >"$stamp"
   fi
   prepare_source
@@ -39,8 +48,8 @@ collect_module_sources() {
 make_target_modules() { # DIRECTORY
   # The host's modpost cannot read the target's tables.
   sed -i '/MODULE_DEVICE_TABLE/d' "$1"/*.c
-  make_modules "$vm/headers" "$kernel_version" "$1" ARCH=arm CROSS_COMPILE=arm-linux-gnueabihf- \
-    DEB_BUILD_ARCH="$(dpkg --print-architecture)" DEB_HOST_ARCH=armhf DEB_HOST_GNU_TYPE=arm-linux-gnueabihf
+  make_modules "$kernel_headers" "$kernel_version" "$1" ARCH="$arch" CROSS_COMPILE="$triple-" \
+    DEB_BUILD_ARCH="$(dpkg --print-architecture)" DEB_HOST_ARCH="$kernel_for" DEB_HOST_GNU_TYPE="$triple"
 }
 
 build_modules() {
@@ -57,7 +66,7 @@ build_modules() {
 # console is on stdout, and at its end how it ended.
 run_hang() {
   local seconds=$1 asked=$2 status=0
-  timeout --foreground "$seconds" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 256 -nographic -no-reboot -net none \
+  timeout --foreground "$seconds" "${emulated[@]}" -m 256 -nographic -no-reboot -net none \
     -icount shift=0,sleep=off -device i6300esb -action watchdog=reset \
     -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/hang-initramfs.gz" \
     -append "console=ttyAMA0 quiet panic=-1 watchdog=$asked" </dev/null >"$vm/console-hang.raw" || status=$?
@@ -78,12 +87,12 @@ judge_hang() {
   fi
 }
 
-# run_machine SECONDS ARGUMENTS: boots; the arguments go to tests/hardware/init. The console is on stdout.
+# run_machine SECONDS ARGUMENT...: boots; the arguments go to tests/hardware/init. The console is on stdout.
 # Its clock counts instructions, one per ns: deadlines hold however slow or busy this machine is, and idling is free.
 run_machine() {
-  timeout --foreground "$1" qemu-system-arm -M virt,highmem=off -cpu cortex-a15 -m 512 -nographic -no-reboot -net none \
+  timeout --foreground "$1" "${emulated[@]}" -m 512 -nographic -no-reboot -net none \
     -icount shift=0,sleep=off \
     -kernel "$kernel_tree/boot/vmlinuz-$kernel_version" -initrd "$vm/initramfs.gz" \
-    -append "console=ttyAMA0 quiet panic=-1 $2" \
+    -append "console=ttyAMA0 quiet panic=-1 ${*:2}" \
     -virtfs "local,path=$root,mount_tag=project,security_model=none,readonly=on,multidevs=remap" </dev/null
 }
