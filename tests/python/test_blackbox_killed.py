@@ -13,6 +13,8 @@ from equipoise_robot.log import read_log
 from equipoise_tools.lockstep_client import Robot
 from started_lockstep import start_lockstep
 
+pytestmark = pytest.mark.live
+
 
 @contextlib.contextmanager
 def busy(count):

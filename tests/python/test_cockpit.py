@@ -20,7 +20,7 @@ from started_cockpit import PATIENCE_S, Started, in_a_loop, talk, until
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
-pytestmark = pytest.mark.usefixtures("multicast")
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("multicast")]
 
 
 @pytest.fixture(scope="module")

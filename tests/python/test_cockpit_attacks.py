@@ -19,7 +19,7 @@ from tornado.websocket import websocket_connect
 
 import lcm
 
-pytestmark = pytest.mark.usefixtures("multicast")
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("multicast")]
 
 
 @pytest.fixture(scope="module")

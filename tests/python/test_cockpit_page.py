@@ -16,7 +16,7 @@ from equipoise_tools import names
 from equipoise_tools.cockpit import frames
 from started_cockpit import PATIENCE_S, Started, until
 
-pytestmark = pytest.mark.usefixtures("multicast")
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("multicast")]
 
 
 @pytest.fixture(scope="module")

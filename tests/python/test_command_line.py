@@ -11,6 +11,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.live
+
 
 @pytest.fixture(scope="module")
 def binary(root):

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.live
+
 
 def test_only_the_holder_of_the_key_commands_the_robot(root, tmp_path):
 

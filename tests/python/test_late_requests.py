@@ -11,6 +11,8 @@ import pytest
 from equipoise_tools.cockpit.robot import private_url
 from started_cockpit import PATIENCE_S
 
+pytestmark = pytest.mark.live
+
 
 class Robot:
     """A simulated robot that takes commands; `stderr` as Popen takes it. SIGHUP as a terminal leaves it: what

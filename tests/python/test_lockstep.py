@@ -13,6 +13,8 @@ from equipoise_robot.log import read_log
 from equipoise_tools import lockstep_client
 from equipoise_tools.lockstep_client import Robot, balance
 
+pytestmark = pytest.mark.live
+
 PLAIN = ["--set", "motor.bridge=drive_brake", "--set", "friction.compensation=0.0"]
 PLAIN += ["--set", "chain.gyro_delay_s=0.0"]  # this engine's IMU is not late
 

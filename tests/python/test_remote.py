@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 from equipoise_robot.log import read_log
 
+pytestmark = pytest.mark.live
+
 EV_KEY, EV_ABS, ABS_Y, BTN_START, BTN_EAST = 1, 3, 1, 0x13B, 0x131
 DEADLINE_S = 60.0  # for a broken program, not for a slow machine
 GAMEPAD = """

@@ -11,6 +11,8 @@ import pytest
 from equipoise_robot.log import read_log
 from equipoise_tools.metrics import summarise
 
+pytestmark = pytest.mark.live
+
 
 @pytest.fixture(scope="session")
 def equipoise(root):

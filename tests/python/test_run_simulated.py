@@ -11,6 +11,8 @@ from equipoise_tools import metrics, names
 
 import lcm
 
+pytestmark = pytest.mark.live
+
 
 @pytest.fixture
 def equipoise(root):

@@ -9,6 +9,8 @@ from equipoise_tools import view
 
 import lcm
 
+pytestmark = pytest.mark.live
+
 
 def state(theta_x=0.1):
     message = equipoise.state_t()

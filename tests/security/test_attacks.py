@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.live
+
 EXPECTATIONS = {
     "stale_arm": 5,
     "replayed_arm": 5,
