@@ -18,6 +18,7 @@ def image(root, *arguments):
         ([], "who may log in"),
         (["--ssh-key", "/nonexistent/key.pub"], "/nonexistent/key.pub: no such file"),
         (["--no-login", "--size-mb", "big"], "--size-mb big"),
+        (["--key-later", "--size-mb", "0"], "--size-mb 0"),
         (["--no-login", "--card"], "unknown argument '--card'"),
         (["--no-login", "--output", "/dev/null"], "--output /dev/null: exists and is no file"),
     ],
