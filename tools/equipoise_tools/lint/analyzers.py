@@ -29,8 +29,8 @@ def cppcheck(tree: Tree) -> list[Finding]:
     if shutil.which("cppcheck") is None:
         return missing("cppcheck")
     command = ["cppcheck", "--quiet", "-j2", "--enable=warning,portability,performance", "--inline-suppr"]
-    # As this machine compiles it: beside include guards the preprocessor decides on vector instructions only, and each
-    # further configuration takes as long again.
+    # As this machine compiles it: beside include guards the preprocessor decides on vector instructions
+    # only, and each further configuration takes as long again.
     command += ["-D__SSE2__", "-D__x86_64__"]
     # Its parser gives up on some of C++17, which is no finding about the source.
     command += ["--suppress=internalAstError", "--template={file}:{line}: {message} [{id}]"]
