@@ -26,6 +26,8 @@
 
 using namespace equipoise;
 
+void PrintTo(const PinRobot& robot, std::ostream* out) { *out << robot.name; }
+
 namespace {
 constexpr int kTicksPerSecond = 200;
 constexpr int kToBalance = 3 * kTicksPerSecond;
