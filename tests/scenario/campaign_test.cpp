@@ -72,6 +72,14 @@ struct Faulty {
   std::vector<int> robots;
 };
 
+/// What no encoder shows grew without bound in the filter and took the digits of the rest: off after minutes
+/// of turning.
+TEST_P(Campaign, WithoutAnEncoderItTurnsForMinutes) {
+  const nlohmann::json turned = result(GetParam(), "--fault encoder_dead --phase spinning --after-s 400");
+  ASSERT_EQ(turned["case_count"].get<int>(), 1);
+  EXPECT_TRUE(turned["cases"][0]["upright"].get<bool>()) << turned["cases"][0].dump();
+}
+
 /// Robots that were lost before: a stall of 50 ms was followed by a quarrel about the gyro; a standing eduMIP
 /// moved too little to say which of its two encoders stood still.
 TEST(Tolerates, WhatWasTheEndBefore) {

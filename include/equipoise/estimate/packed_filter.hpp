@@ -2,8 +2,9 @@
 // a fraction of the instructions, in single or double precision. P is an upper triangle packed by rows, so
 // that it is symmetric by form; its rows start at even columns, so that pairs are aligned. Angles that grow
 // are kept within a few radians, so that single precision resolves them; what is whole in them stands beside.
-// Filters that are copies share their constants; one can adopt the state of another for the price of a copy.
-// In: input, measurements with a mask of those to use -> state, variances, innovations and their variances.
+// An angle that no sample shows is forgotten before its variance takes the digits of the others'. Filters
+// that are copies share their constants; one can adopt the state of another for the price of a copy. In:
+// input, measurements with a mask of those to use -> state, variances, innovations and their variances.
 // Source: tools/derive/packed.py; docs/filter.md. RT-safe: fixed size, bounded.
 #pragma once
 
@@ -25,7 +26,8 @@ namespace equipoise {
 
 /// Steps: generated, with Constants, prepare(), predict(), innovate(). A Model supplies, beside what
 /// KalmanFilter asks for, `Steps::Constants<double> constants()` without the noises, `kTurning`, the first of
-/// `kTurnings` angles that its motion does not depend on, and `turning_rows()`, how the samples do.
+/// `kTurnings` angles that its motion does not depend on, and `turning_rows()`, how the samples do: those of
+/// the wheels, as many from `kWheel` on.
 template <class Model, class Steps>
 class PackedFilter {
  public:
@@ -39,7 +41,9 @@ class PackedFilter {
   using Params = typename KalmanFilter<Model>::Params;
 
   PackedFilter(const Model& model, const Params& params, Precision precision = Precision::kDouble)
-      : initial_variance_(params.initial_variance), turning_rows_(model.turning_rows()) {
+      : initial_variance_(params.initial_variance),
+        turning_rows_(model.turning_rows()),
+        of_wheel_(turning_rows_.template middleRows<Model::kTurnings>(Model::kWheel).inverse()) {
     Constants<double> k = model.constants();
     const Mat<n, p> B = model.input_matrix();
     Mat<n, n> Q = B * params.input_variance.asDiagonal() * B.transpose();
@@ -164,6 +168,7 @@ class PackedFilter {
         equipoise::correct<n, m>(core.step, core.Ph, core.x.data());
         downdate<n, m>(core.weight, core.Ph, core.P.data());
       }
+      forget_unseen(core);
       keep_small(core);
       show(core);
     });
@@ -318,6 +323,36 @@ class PackedFilter {
     show(core);
   }
 
+  /// The angles as wheel i would see them alone, w' e, stand in no other sample: once nobody knows them to a
+  /// radian, they start anew, apart from all else, P <- (I - d w') P (I - d w')' + V d d' with w' d = 1. The
+  /// rest is as it was.
+  template <class Real>
+  void forget_unseen(Core<Real>& core) noexcept {
+    constexpr int kAngles = Model::kTurnings;
+    for (int i = 0; i < kAngles; ++i) {
+      const auto row = static_cast<std::size_t>(Model::kWheel + i);
+      if (core.weight[row] != Real{0} || !(row_variance_[row] > 1.0)) continue;
+      const Turnings w = turning_rows_.row(Model::kWheel + i);
+      const Turnings d = of_wheel_.col(i);
+      Vec<n> Pw;
+      for (int j = 0; j < n; ++j) {
+        Pw(j) = 0.0;
+        for (int k = 0; k < kAngles; ++k) Pw(j) += P_at(j, Model::kTurning + k) * w(k);
+      }
+      const double anew = w.dot(Pw.template segment<kAngles>(Model::kTurning)) +
+                          initial_variance_(Model::kTurning) * w.squaredNorm();
+      for (int k = 0; k < kAngles; ++k) {
+        for (int j = 0; j < n; ++j) {
+          const int l = j - Model::kTurning;
+          const bool angle = l >= 0 && l < kAngles;
+          if (angle && l < k) continue;  // the same entry
+          const double of_both = angle ? d(l) * (Pw(Model::kTurning + k) - d(k) * anew) : 0.0;
+          core.P[place(Model::kTurning + k, j)] -= static_cast<Real>(d(k) * Pw(j) + of_both);
+        }
+      }
+    }
+  }
+
   /// Whole radians leave the angles; exact in either precision.
   template <class Real>
   void keep_small(Core<Real>& core) noexcept {
@@ -344,8 +379,9 @@ class PackedFilter {
   Vec<n> initial_variance_;
   Vec<n> x_;
   Mat<m, Model::kTurnings> turning_rows_;
-  Turnings whole_;         // what x has beside the core's
-  Vec<m> expected_whole_;  // of the samples
+  Mat<Model::kTurnings, Model::kTurnings> of_wheel_;  // the angles that one wheel sees and the others do not
+  Turnings whole_;                                    // what x has beside the core's
+  Vec<m> expected_whole_;                             // of the samples
   double normalized_innovation_ = 0.0;
   std::array<double, m> row_nis_{};
   std::array<double, m> row_innovation_{};
