@@ -16,11 +16,11 @@ _PATH = re.compile(r"(?:config|docs|drivers|examples|include|lcm|packaging|pytho
 _KEY_TABLES = "attitude|calibration|chain|controller|estimator|friction|motor|reference|robot|safety|world"
 _KEY = re.compile(rf"(?<!equipoise_)(?:{_KEY_TABLES})\.[a-z_][\w.\[\]*]*")
 _TEST = re.compile(r"test_\w+\.py::test_\w+")
-_LINE = re.compile(r"([\w./-]+\.(?:py|cpp|hpp|h|c|toml|md)):(\d+)")
+_LINE = re.compile(r"([\w./-]+\.(?:py|cpp|hpp|h|c|toml|md|txt|lcm|js|sh)):(\d+)")
 _NUMBER_LINK = re.compile(
     r"\[([^\]]*\d[^\]]*)\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)"
 )
-_CITED = re.compile(r"\[[^\]]*\]\(((?:\.\./|docs/)*reports/[\w./-]+\.md)(?:#[\w-]+)?\)")
+_CITED = re.compile(r"\[[^\]]*\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)")
 _BARE = re.compile(r"[\w-]+\.(?:py|cpp|hpp)")  # a source without its folder
 MADE_BY_BUILD = ("build/", "logs/")
 OF_DEBIAN = ("/", "~")
@@ -228,6 +228,8 @@ def test_what_pages_name_exists(root):
         ("see `test_nothing_at_all.py`", "no file test_nothing_at_all.py"),
         ("run `./tools/campaign\n  --robotz 3`", "has no --robotz"),
         ("at src/app/main.cpp:99999", "no line src/app/main.cpp:99999"),
+        ("at CMakeLists.txt:99999", "no line CMakeLists.txt:99999"),
+        ("it falls in 0.7 s, [control](experiments/control.md)", "does not say 0.7"),
         ("`test_links.py::test_that_is_not_there`", "no test test_links.py::test_that_is_not_there"),
         ("[0.00777 rad](reports/as-built.md)", "does not say 0.00777"),
         ("- Of 987 robots all stood\n  ([report](reports/as-built.md)).", "does not say 987"),
@@ -240,7 +242,8 @@ def test_what_pages_name_exists(root):
     ],
 )
 def test_a_wrong_name_is_found(root, tmp_path, line, complaint):
-    (tmp_path / "reports").symlink_to(root / "docs/reports")
+    for folder in ("reports", "experiments"):
+        (tmp_path / folder).symlink_to(root / "docs" / folder)
     page = tmp_path / "page.md"
     page.write_text(f"# Page\n{line}\n")
     found = complaints(root, page)
