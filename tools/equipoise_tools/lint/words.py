@@ -90,6 +90,9 @@ def words(tree: Tree) -> list[Finding]:
     findings = []
     for name in pages(tree):
         findings += found(name, without_code(tree.text(name)), TERMS)
+    for name in (n for n in tree.ending(".toml") if n.startswith("config/")):
+        comments = "\n".join(line.partition("#")[2] for line in tree.text(name).splitlines())
+        findings += found(name, without_code(comments), TERMS)
     for name in tree.ending(*C_SUFFIXES, ".py", ".js", ".sh"):
         if not name.startswith(CODE) or name in SAYS_OLD_WORDS:
             continue
