@@ -307,7 +307,7 @@ def test_the_leading_ratio_is_plotted_against_its_bound(page, cockpit):
           const { holder, columns } = plots.plots.at(-1);
           return [holder.textContent, plots.history.view(columns).map((c) => Array.from(c))];
         }""")
-    assert title.startswith("Fault evidence")
+    assert title.startswith("Fault hypotheses")
     assert [column[1] for column in columns] == [2, 21, 3, 18.6]
     assert all(math.isnan(column[0]) for column in columns[1:])
 

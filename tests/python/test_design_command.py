@@ -1,6 +1,7 @@
 """`equipoise design`: the firmware's own gains against SciPy, and what it says of the loop."""
 
 import json
+import re
 import subprocess
 
 import numpy as np
@@ -124,7 +125,17 @@ def test_gains_poles_and_margins_are_printed(root):
 @pytest.mark.parametrize("controller", ["slc", "lqr"])
 def test_the_shipped_edumip_has_every_margin_at_every_yaw_rate(root, controller):
     places = ("--controller", controller, "--last-hz", "1.6", "--step-hz", "0.1")
-    assert list(shortfalls(design(root, "edumip", *places))) == []
+    made = design(root, "edumip", *places)
+    assert list(shortfalls(made)) == []
+    page = (root / "docs/derivation.md").read_text(encoding="utf-8")
+    table = page.partition("| | broken at |")[2].partition(f"| `{controller}` ")[2]
+    for line, place in zip(table.splitlines(), ("u", "gyro", "encoder"), strict=False):
+        quoted = [float(number) for number in re.findall(r"[-+]?\d+(?:\.\d+)?", line)]
+        of_all = [row["margins"][place] for row in made["rows"]]
+        names = ("gain_down_dB", "gain_up_dB", "phase_deg", "delay_ms")
+        least = [min((m[name] for m in of_all if m[name] is not None), key=abs) for name in names]
+        assert f"| {place} |" in line
+        assert quoted == pytest.approx(least, rel=3e-3, abs=0.06)
 
 
 def test_margins_tell_a_stiff_wheel_loop(root):

@@ -16,11 +16,11 @@ _PATH = re.compile(r"(?:config|docs|drivers|examples|include|lcm|packaging|pytho
 _KEY_TABLES = "attitude|calibration|chain|controller|estimator|friction|motor|reference|robot|safety|world"
 _KEY = re.compile(rf"(?<!equipoise_)(?:{_KEY_TABLES})\.[a-z_][\w.\[\]*]*")
 _TEST = re.compile(r"test_\w+\.py::test_\w+")
-_LINE = re.compile(r"([\w./-]+\.(?:py|cpp|hpp|h|c|toml|md)):(\d+)")
+_LINE = re.compile(r"([\w./-]+\.(?:py|cpp|hpp|h|c|toml|md|txt|lcm|js|sh)):(\d+)")
 _NUMBER_LINK = re.compile(
     r"\[([^\]]*\d[^\]]*)\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)"
 )
-_CITED = re.compile(r"\[[^\]]*\]\(((?:\.\./|docs/)*reports/[\w./-]+\.md)(?:#[\w-]+)?\)")
+_CITED = re.compile(r"\[[^\]]*\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)")
 _BARE = re.compile(r"[\w-]+\.(?:py|cpp|hpp)")  # a source without its folder
 MADE_BY_BUILD = ("build/", "logs/")
 OF_DEBIAN = ("/", "~")
@@ -197,6 +197,21 @@ def wrong_quotes(page: Path, text: str) -> list[str]:
     return found
 
 
+@cache
+def words_of_code(root: Path) -> frozenset[str]:
+    files = tree_of_git(root).ending(".py", ".cpp", ".hpp")
+    ours = [name for name in files if name.startswith(("python/", "examples/", "src/"))]
+    return frozenset(re.findall(r"\w+", " ".join((root / name).read_text() for name in ours)))
+
+
+def wrong_names(root: Path, text: str) -> list[str]:
+    """Attributes in Python blocks: of our code, pandas or Matplotlib."""
+    blocks = "".join(re.findall(r"```python\n(.*?)```", text, re.S))
+    names = re.findall(r"\.([a-z]\w+)", re.sub(r"#.*|\"[^\"\n]*\"", "", blocks))
+    others = {"groupby", "describe", "plot", "figure", "savefig"}
+    return [f"no name .{name}" for name in names if name not in others | words_of_code(root)]
+
+
 def complaints(root: Path, page: Path) -> list[str]:
     text = page.read_text(encoding="utf-8")
     found = []
@@ -205,7 +220,8 @@ def complaints(root: Path, page: Path) -> list[str]:
         for said in commands_of(code):
             wrong += wrong_options(root, said)
         found += [f"{page.name}:{number}: {what}" for what in wrong]
-    whole = wrong_lines(root, text) + wrong_tests(root, text) + wrong_quotes(page, text)
+    whole = wrong_lines(root, text) + wrong_tests(root, text) + wrong_names(root, text)
+    whole += wrong_quotes(page, text)
     return found + [f"{page.name}: {what}" for what in whole]
 
 
@@ -228,6 +244,9 @@ def test_what_pages_name_exists(root):
         ("see `test_nothing_at_all.py`", "no file test_nothing_at_all.py"),
         ("run `./tools/campaign\n  --robotz 3`", "has no --robotz"),
         ("at src/app/main.cpp:99999", "no line src/app/main.cpp:99999"),
+        ("```python\nrun.log.sensor_table()\n```", "no name .sensor_table"),
+        ("at CMakeLists.txt:99999", "no line CMakeLists.txt:99999"),
+        ("it falls in 0.7 s, [control](experiments/control.md)", "does not say 0.7"),
         ("`test_links.py::test_that_is_not_there`", "no test test_links.py::test_that_is_not_there"),
         ("[0.00777 rad](reports/as-built.md)", "does not say 0.00777"),
         ("- Of 987 robots all stood\n  ([report](reports/as-built.md)).", "does not say 987"),
@@ -240,7 +259,8 @@ def test_what_pages_name_exists(root):
     ],
 )
 def test_a_wrong_name_is_found(root, tmp_path, line, complaint):
-    (tmp_path / "reports").symlink_to(root / "docs/reports")
+    for folder in ("reports", "experiments"):
+        (tmp_path / folder).symlink_to(root / "docs" / folder)
     page = tmp_path / "page.md"
     page.write_text(f"# Page\n{line}\n")
     found = complaints(root, page)

@@ -132,6 +132,7 @@ def test_statuses():
     assert status_of(("ours", {"at_least": 1.5})) == CORRECTED
     assert status_of(("printed", {"at_least": 1.5}), ("ours", {"at_least": 1.5})) == CORRECTED
     assert status_of(("printed", {"at_most": 1.5}), ("ours", {"at_least": 3, "text": "two"})) == NOT_SHOWN
+    assert status_of(("printed", {"at_most": 1.5}), ("printed", {"at_most": 0.5})) == NOT_SHOWN
     assert status_of(("printed", {"at_most": 1.5, "claim": "ours"})) == NOT_SHOWN
     fitted = Result("", "", "", "", Data())
     fitted.data.add("fit", "error", 1.0, Ran("ekf13_published", fitted="all of it"))

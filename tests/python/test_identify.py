@@ -1,13 +1,14 @@
 """equipoise identify: parameters out of bench logs, fragments for a configuration, clear refusals."""
 
 import json
+import shutil
 import subprocess
 import tomllib
 
 import numpy as np
 import pandas as pd
 import pytest
-from equipoise_tools.paths import binary
+from equipoise_tools.paths import binary, repository_root
 from equipoise_tools.table import matlab
 from scipy.signal import lfilter
 
@@ -40,8 +41,11 @@ def test_motor_parameters_come_back_and_a_configuration_includes_them(brake_log,
     assert not found["inductance_H"]["determined"]  # 55 us against samples of 5 ms
     text = fragment.read_text()
     assert "# inductance_H: the data do not determine it" in text
-    include = f'include=["{fragment}"]'
-    simulated = run("sim", "--config", "config/mbbr.toml", "--set", include, "--duration-s", 0.1, "--log",
+    assert 'beside this file: include = ["motor.toml"]\n' in text
+    beside = tmp_path / "mbbr.toml"
+    shutil.copy(repository_root() / "config/mbbr.toml", beside)
+    include = 'include=["motor.toml"]'
+    simulated = run("sim", "--config", beside, "--set", include, "--duration-s", 0.1, "--log",
                  tmp_path / "a.lcm", "--telemetry", "off", "--json", "-", status=0)  # fmt: skip
     plain = run("sim", "--config", "config/mbbr.toml", "--duration-s", 0.1, "--log",
                 tmp_path / "b.lcm", "--telemetry", "off", "--json", "-", status=0)  # fmt: skip

@@ -81,7 +81,7 @@ def test_the_leading_ratio_is_drawn_against_its_bound(judged_log, log):
     assert {s.label: s.values.max() for s in plot.series} == highest
     assert not any("Fault" in p.title for p in plots_of(Run("", log, summarise(log)), False))
     figure = figures.draw_report(judged_log, summarise(judged_log))
-    (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left") == "Fault evidence")
+    (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left") == "Fault hypotheses")
     assert {line.get_label(): max(line.get_ydata()) for line in axes.lines} == highest
     figures.plt.close(figure)
 

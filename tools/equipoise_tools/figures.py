@@ -214,7 +214,7 @@ class Report:
             ("bound", "bound", style.REFERENCE),
         ):
             axes.plot(t_s, faults[field], color=colour, lw=0.8, label=label)
-        axes.set(title="Fault evidence", ylabel="nats", ylim=(-5, 1.6 * float(faults["bound"].max())))
+        axes.set(title="Fault hypotheses", ylabel="nats", ylim=(-5, 1.6 * float(faults["bound"].max())))
         legend_beside_title(axes, 3)
         self.finish_time_axis(axes)
 

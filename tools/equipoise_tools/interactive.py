@@ -121,7 +121,7 @@ def plots_of(run: Run, compared: bool) -> list[Plot]:
         if not compared:
             series.append(Series("runner-up", t_s, faults["runner_up_ratio"], style.colour(2)))
             series.append(Series("bound", t_s, faults["bound"], style.REFERENCE, True))
-        plots.append(Plot("Fault evidence, log-likelihood ratio", "nats", series))
+        plots.append(Plot("Fault hypotheses, log-likelihood ratio", "nats", series))
     if not compared and run.summary.estimators:
         errors = run.summary.estimators.items()
         plots.append(

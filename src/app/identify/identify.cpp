@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 
@@ -33,7 +34,8 @@ void write_fragment(const IdentifyArguments& a, const Keys& wanted, const Identi
   check_output(a.out, {beginning}, "identified parameters");
   std::ofstream file(a.out);
   file.precision(5);
-  file << beginning << a.log << "; name it in the configuration: include = [\"" << a.out << "\"]\n";
+  file << beginning << a.log << "; in a configuration beside this file: include = ["
+       << std::filesystem::path(a.out).filename() << "]\n";
   const auto is_key = [&](const std::string& name) {
     return std::find(wanted.keys.begin(), wanted.keys.end(), name) != wanted.keys.end();
   };

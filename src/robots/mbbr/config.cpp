@@ -212,12 +212,12 @@ Loaded<MbbrConfig> parse_mbbr(const std::string& text, const std::string& origin
 }
 
 MbbrThesisPipeline::Params MbbrConfig::thesis_pipeline() const {
-  MbbrReferenceParams as_printed = reference;  // commands pass as they are, [T] section 6.2.1
-  as_printed.max_jerk_m_s3 = std::numeric_limits<double>::infinity();
-  as_printed.floor_yaw_acceleration_rad_s2 = std::numeric_limits<double>::infinity();
-  as_printed.budget = DutyBudget{};
-  as_printed.feasible_acceleration_m_s2 = std::numeric_limits<double>::infinity();
-  return {robot, calibration, estimators, as_printed, thesis, friction, motor, safety, attitude};
+  MbbrReferenceParams as_published = reference;  // [T] 6.2.1 limits no command; the configured limits stay
+  as_published.max_jerk_m_s3 = std::numeric_limits<double>::infinity();
+  as_published.floor_yaw_acceleration_rad_s2 = std::numeric_limits<double>::infinity();
+  as_published.budget = DutyBudget{};
+  as_published.feasible_acceleration_m_s2 = std::numeric_limits<double>::infinity();
+  return {robot, calibration, estimators, as_published, thesis, friction, motor, safety, attitude};
 }
 
 MbbrScheduledPipeline::Params MbbrConfig::scheduled_pipeline() const {

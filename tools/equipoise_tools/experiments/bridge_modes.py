@@ -88,7 +88,7 @@ def report(data: Data, out_dir: Path) -> Result:
                 continue
             text = f"{world}: compensated coasting at {pwm_hz} Hz is no worse than braking by more than 15 %"
             result.check("Fig. 4.6", text, case, "lean_variance_mrad2", at_most=1.15, over=over)
-            text = f"{world}: and equals it within 15 %"
+            text = f"{world}: compensated coasting at {pwm_hz} Hz equals braking within 15 %"
             result.check("Fig. 4.6", text, case, "lean_variance_mrad2", between=(0.85, 1.15), over=over)
         for pwm_hz in PWM_HZ[:3]:
             text = f"{world}: uncompensated coasting at {pwm_hz} Hz is worse than braking by 15 % or more"

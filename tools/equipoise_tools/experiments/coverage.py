@@ -34,6 +34,8 @@ TARGETS = {
     "Fig. 3.4b": ("MIP accelerometer, measured and predicted", "the lever arm is fitted"),
     "(3.41), (3.42)": ("discrete high yaw-rate model of the MIP", "0.009 and -0.016 are wrong"),
     "(3.43), (3.47)": ("its yaw and accelerometer", ""),
+    "(3.50), (3.51)": ("its tilt and wheel loops", "three digits; unstable at 100 Hz, too"),
+    "(3.52)": ("its heading loop", ""),
     "4.4": ("3 to 5 iterations of Newton's method", "to 1e-3 of the duty"),
     "Fig. 4.2": ("current through one PWM period", ""),
     "Fig. 4.4": ("motor command of the bench", "a picture of the input; nothing to test"),

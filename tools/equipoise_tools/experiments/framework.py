@@ -200,7 +200,8 @@ def status(findings: list[Finding]) -> str:
         return NOT_SHOWN
     if any(f.derived and not f.holds and standing(f.ran) == PUBLISHED for f in claims):
         return REFUTED
-    borne_out = {f.text for f in claims if f.holds}
+    failed = {(f.text, str(f.ran)) for f in claims if not f.holds}  # in one world, say, of two that it names
+    borne_out = {f.text for f in claims if (f.text, str(f.ran)) not in failed}
     if any(f.text not in borne_out for f in claims):
         return NOT_SHOWN
     first_failed = any(not f.holds for f in claims)

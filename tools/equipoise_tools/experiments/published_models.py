@@ -1,4 +1,4 @@
-"""Published models beside the exact plant: (3.41)-(3.47), 4.4, (5.28)-(5.33), (6.10), (6.25)."""
+"""Published models beside the exact plant: (3.41)-(3.52), 4.4, (5.28)-(5.33), (6.10), (6.25)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from scipy import signal
 
 from .. import published, style
 from ..style import plt
@@ -15,14 +16,15 @@ from .framework import Result
 from .runs import BUILT, NO_GATES, Case, Lab, equipoise_json
 
 COVERS = (
-    "(3.41), (3.42)", "(3.43), (3.47)", "4.4", "(5.28)", "(5.29)", "(5.31), (5.33)", "(5.32)",
-    "(6.10), Fig. 6.2", "(6.25)",
+    "(3.41), (3.42)", "(3.43), (3.47)", "(3.50), (3.51)", "(3.52)", "4.4", "(5.28)", "(5.29)",
+    "(5.31), (5.33)", "(5.32)", "(6.10), Fig. 6.2", "(6.25)",
 )  # fmt: skip
 ROUNDING = 0.025  # of two published digits
 EXACT = Ran(world="exact plant")
 SMALL = 1e-4
 SPIN_RAD_S, BALL_RAD_S = 2 * np.pi, 6.25  # 1 Hz, 20 cm/s
 T_R, STALL = 0.289, 1.0  # (6.16); currents over the stall current
+LOOPS = {"200 Hz": 0.005, "100 Hz": 0.01}
 SPINNING = {
     "controller": "thesis",
     "estimator": "truth",
@@ -117,6 +119,32 @@ def coefficients(data: Data) -> None:
     data.add("(6.25) of a ramp", "over_the_slope", float((ramp[3] - ramp[1]) * 120.0 / 0.2), Ran())
 
 
+def loop_radius(period_s: float) -> float:
+    """Spectral radius of u = D1 (D2 (-phi) - theta), (3.50), (3.51), on the exact plant upright at rest."""
+    found = slopes("mip", around(mip, ("theta", "ball", "u_x")), lambda row: np.array(row["qdd"][:2]))
+    A, b = np.zeros((4, 4)), np.zeros((4, 1))  # theta, phi, theta', phi'
+    A[0, 2] = A[1, 3] = 1.0
+    A[2:, 0], A[2:, 3], b[2:, 0] = found["theta"], found["ball"], found["u_x"]
+    F, g, *_ = signal.cont2discrete((A, b, np.eye(4), np.zeros((4, 1))), period_s)
+    inner, outer = (published.table()[where] for where in ("(3.50)", "(3.51)"))
+    A1, B1, C1, D1 = signal.tf2ss(inner["numerator"], inner["denominator"])
+    A2, B2, C2, D2 = signal.tf2ss(outer["numerator"], outer["denominator"])
+    x, theta, phi, x1, x2 = (np.eye(8)[rows] for rows in (slice(4), [0], [1], slice(4, 6), slice(6, 8)))
+    error = C2 @ x2 - D2 @ phi - theta
+    plant = F @ x + g @ (C1 @ x1 + D1 @ error)
+    closed = np.vstack([plant, A1 @ x1 + B1 @ error, A2 @ x2 - B2 @ phi])
+    return float(np.max(np.abs(np.linalg.eigvals(closed))))
+
+
+def loops(data: Data) -> None:
+    for name, period_s in LOOPS.items():
+        data.add(f"(3.50), (3.51) at {name}", "spectral_radius", loop_radius(period_s), EXACT)
+    (a, b), (k, k_rate) = published.table()["(3.43)"]["psi_dot"], published.table()["(3.52)"]["gains"]
+    heading = np.array([[1.0, published.table()["Table 3.2"]["period_s"]], [-b * k, a - b * k_rate]])
+    radius = float(np.max(np.abs(np.linalg.eigvals(heading))))
+    data.add("(3.52) on (3.43)", "spectral_radius", radius, Ran())
+
+
 def iterations(target: float, speed: float) -> int:
     """Of (4.31)-(4.34) to 1e-3 of the duty, for a positive target over the stall current."""
 
@@ -169,12 +197,13 @@ def measure(lab: Lab) -> Data:
     data = lab.run(cases())
     coefficients(data)
     newton(data)
+    loops(data)
     return data
 
 
 def report(data: Data, out_dir: Path) -> Result:
     result = Result(
-        title="Published models and formulas ((3.41)-(3.47), 4.4, (5.28)-(5.33), (6.10), (6.25))",
+        title="Published models and formulas ((3.41)-(3.52), 4.4, (5.28)-(5.33), (6.10), (6.25))",
         command="tools/experiments published_models",
         method="Each published coefficient beside the slope of the exact plant of Tables 5.2 and 3.2 "
         "(`equipoise model`), upright at rest; a coefficient holds within 2.5 %, the rounding of two digits. "
@@ -207,6 +236,13 @@ def report(data: Data, out_dir: Path) -> Result:
         between=(0.95, 1.05),
         derived=True,
     )
+    for target, case, claim in (
+        ("(3.50), (3.51)", "(3.50), (3.51) at 200 Hz", "[T]"),
+        ("(3.50), (3.51)", "(3.50), (3.51) at 100 Hz", "ours"),
+        ("(3.52)", "(3.52) on (3.43)", "[T]"),
+    ):
+        text = f"{case}: stable"
+        result.check(target, text, case, "spectral_radius", at_most=1.0, derived=True, claim=claim)
     case = "(4.31)-(4.34), T_r of the MBBR"
     for quantity in ("fewest", "median", "most", "share_within_3_to_5"):
         result.add("4.4", f"iterations, {quantity.replace('_', ' ')}", case, quantity)

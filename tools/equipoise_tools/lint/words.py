@@ -28,9 +28,10 @@ TERMS = terms(
         (r"lie[sd]?|liars?|lying|honest(?:ly)?", "faulty, inconsistent, healthy; resting (of a body)"),
         (r"left out|leav(?:e|es|ing) out|do(?:es|ing)? without", "excluded, omitted"),
         (r"surprises?|surprised|condemn(?:s|ed)?|blame[sd]?", "innovation, likelihood ratio, isolated"),
+        (r"odds|evidence", "likelihood ratio"),
         (r"witness(?:es|ed)?|hear[sd]?|feels?|felt|spoil(?:s|t)?|obey(?:s|ed|ing)?", "measure, apply"),
         (r"rooms?|house rules?", "module, folder, layout, rules"),
-        (r"the play|play (?:at|in|of)|play is", "backlash"),
+        (r"the play|much play|play (?:at|in|of)|play is", "backlash"),
         (r"as printed|printed (?:ekf|kf|filter|gains|form|one|model|planar|sign)", "as published, published"),
         (r"lean(?:s|ed|ing)?", "tilt"),
         (r"let(?:s|ting)? go", "disarm, release"),
@@ -89,6 +90,9 @@ def words(tree: Tree) -> list[Finding]:
     findings = []
     for name in pages(tree):
         findings += found(name, without_code(tree.text(name)), TERMS)
+    for name in (n for n in tree.ending(".toml") if n.startswith("config/")):
+        comments = "\n".join(line.partition("#")[2] for line in tree.text(name).splitlines())
+        findings += found(name, without_code(comments), TERMS)
     for name in tree.ending(*C_SUFFIXES, ".py", ".js", ".sh"):
         if not name.startswith(CODE) or name in SAYS_OLD_WORDS:
             continue

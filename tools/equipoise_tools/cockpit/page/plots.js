@@ -50,22 +50,22 @@ function row(frame, robot, radius) {
     frame.WHAT_IF_FAULTS ? frame.WHAT_IF_FAULTS.ratio : NaN];
 }
 
-const FAULTS = ["Fault evidence, log-likelihood ratio (nats)", ["ratio", "leading", "blue"], ["runnerUp", "runner-up", "green"], ["bound", "bound", "red", [4, 3]],
+const FAULTS = ["Fault hypotheses, log-likelihood ratio (nats)", ["ratio", "leading", "blue"], ["runnerUp", "runner-up", "green"], ["bound", "bound", "red", [4, 3]],
   ["thenRatio", "what if", "pink", [2, 2]]];
 const PANELS = {
   mbbr: [
-    ["Tilt (deg)", ["tiltX", "about x", "blue"], ["tiltY", "about y", "green"], ["refX", "wanted x", "red", [4, 3]], ["refY", "wanted y", "yellow", [4, 3]],
+    ["Tilt (deg)", ["tiltX", "about x", "blue"], ["tiltY", "about y", "green"], ["refX", "target x", "red", [4, 3]], ["refY", "target y", "yellow", [4, 3]],
       ["thenX", "what if x", "pink", [2, 2]], ["thenY", "what if y", "black", [2, 2]]],
-    ["Speed, as the nose points (cm/s)", ["speedX", "forward", "blue"], ["speedY", "left", "green"], ["refSpeedX", "wanted forward", "red", [4, 3]], ["refSpeedY", "wanted left", "yellow", [4, 3]]],
-    ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "asked for", "red", [4, 3]]],
+    ["Speed along the robot (cm/s)", ["speedX", "forward", "blue"], ["speedY", "left", "green"], ["refSpeedX", "target forward", "red", [4, 3]], ["refSpeedY", "target left", "yellow", [4, 3]]],
+    ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "target", "red", [4, 3]]],
     ["Duty", ["duty0", "motor 1", "blue"], ["duty1", "motor 2", "green"], ["duty2", "motor 3", "pink"]],
     ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"], ["thenNis", "what if", "pink", [2, 2]]],
     FAULTS,
   ],
   mip: [
-    ["Tilt (deg)", ["tiltX", "lean", "blue"], ["refX", "wanted", "red", [4, 3]], ["thenX", "what if", "pink", [2, 2]]],
-    ["Wheel speed (cm/s)", ["speedX", "measured", "blue"], ["refSpeedX", "wanted", "red", [4, 3]]],
-    ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "asked for", "red", [4, 3]]],
+    ["Tilt (deg)", ["tiltX", "tilt", "blue"], ["refX", "target", "red", [4, 3]], ["thenX", "what if", "pink", [2, 2]]],
+    ["Wheel speed (cm/s)", ["speedX", "measured", "blue"], ["refSpeedX", "target", "red", [4, 3]]],
+    ["Yaw rate (Hz)", ["yaw", "measured", "blue"], ["wantedYaw", "target", "red", [4, 3]]],
     ["Duty", ["duty0", "motor 1", "blue"], ["duty1", "motor 2", "green"]],
     ["Battery (V) and NIS/dof", ["battery", "battery", "yellow"], ["nis", "NIS/dof", "black"], ["thenNis", "what if", "pink", [2, 2]]],
     FAULTS,
