@@ -319,36 +319,33 @@ TYPED_TEST(PackedFilterTest, WithoutSamplesChangesNothing) {
   EXPECT_EQ(this->packed_.normalized_innovation(), 0.0);
 }
 
-/// What a wheel alone shows of the angles is forgotten once nobody knows it to a radian; the dense form keeps
-/// it, and all else goes on as there.
+/// Once nobody knows to a radian what a wheel alone shows; the dense form keeps it. All else goes on as
+/// there.
 TYPED_TEST(PackedFilterTest, ForgetsAnAngleThatNoSampleShows) {
-  constexpr int kAngles = TypeParam::Model::kTurnings;
-  constexpr int kFirst = TypeParam::Model::kTurning;
-  constexpr int kWheel = TypeParam::Model::kWheel;
+  using Angles = typename TypeParam::Model;
+  constexpr int kAngles = Angles::kTurnings;
   auto& dense = this->dense_;
   auto& packed = this->packed_;
   auto use = all_true<TestFixture::m>();
-  use[kWheel] = false;
+  use[Angles::kWheel] = false;
   const auto rows = this->model_.turning_rows();
   const auto of_wheel = [&](const auto& P, int i) {
-    const Vec<kAngles> w = rows.row(kWheel + i);
-    return w.dot(P.template block<kAngles, kAngles>(kFirst, kFirst) * w);
+    const Vec<kAngles> w = rows.row(Angles::kWheel + i);
+    return w.dot(P.template block<kAngles, kAngles>(Angles::kTurning, Angles::kTurning) * w);
   };
   const auto seen = [&](const Vec<TestFixture::n>& x) {  // all but the angle of that wheel alone
     Vec<TestFixture::n> other = x;
-    other.template segment<kAngles>(kFirst) =
-        rows.template middleRows<kAngles>(kWheel) * x.template segment<kAngles>(kFirst);
-    other(kFirst) = 0.0;
+    other.template segment<kAngles>(Angles::kTurning) =
+        rows.template middleRows<kAngles>(Angles::kWheel) * x.template segment<kAngles>(Angles::kTurning);
+    other(Angles::kTurning) = 0.0;
     return other;
   };
-  dense.reset(TypeParam::truth(0.0));
-  packed.reset(TypeParam::truth(0.0));
-  dense.widen(kFirst, kAngles, 2.0);
-  packed.widen(kFirst, kAngles, 2.0);
-  Vec<TestFixture::m> y;
-  Mat<TestFixture::m, TestFixture::n> H;
+  dense.reset(TypeParam::truth(0.0)), packed.reset(TypeParam::truth(0.0));
+  dense.widen(Angles::kTurning, kAngles, 2.0), packed.widen(Angles::kTurning, kAngles, 2.0);
+  const Vec<TestFixture::p> u = Vec<TestFixture::p>::Constant(0.1);
   for (int k = 0; k < 400; ++k) {
-    const Vec<TestFixture::p> u = Vec<TestFixture::p>::Constant(0.1);
+    Vec<TestFixture::m> y;
+    Mat<TestFixture::m, TestFixture::n> H;
     dense.predict(u);
     packed.predict(u);
     this->model_.measure(TypeParam::truth(k * kTickS), u, y, H);
@@ -356,7 +353,7 @@ TYPED_TEST(PackedFilterTest, ForgetsAnAngleThatNoSampleShows) {
     packed.update(u, y, use);
     ASSERT_LT((seen(packed.x()) - seen(dense.x())).norm(), 1e-9 * dense.x().norm()) << k;
     for (int i = 0; i < TestFixture::n; ++i) {
-      if (i >= kFirst && i < kFirst + kAngles) continue;
+      if (i >= Angles::kTurning && i < Angles::kTurning + kAngles) continue;
       ASSERT_NEAR(packed.variance(i) / dense.P()(i, i), 1.0, 1e-7) << k << " state " << i;
     }
     for (int i = 1; i < kAngles; ++i)
