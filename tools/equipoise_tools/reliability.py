@@ -14,6 +14,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
+from datetime import date
 
 from .entry import leave
 from .reliability_faults import faults
@@ -84,7 +85,7 @@ def traced(console: str) -> tuple[str, str, str, bool]:
 
 def trace(_: argparse.Namespace) -> Part:
     output(ROOT / "tools/vm-test", "robot", check=False)
-    return Part([traced((ROOT / "build/vm/console-bookworm.log").read_text(errors="replace"))])
+    return Part([traced((ROOT / "build/vm/console-bbb.log").read_text(errors="replace"))])
 
 
 def sandbox(_: argparse.Namespace) -> Part:
@@ -291,7 +292,7 @@ def measure(name: str, options: argparse.Namespace) -> Part:
 
 HOLDS = {True: "yes", False: "**no**", None: "skipped: no evidence here"}
 HEAD = """# Reliability
-Written by `tools/reliability`{arguments}, {cpus} CPUs, kernel {kernel}. Faults enter at the hardware
+Written by `tools/reliability`{arguments} at {commit}, {date}, {cpus} CPUs. Faults enter at the hardware
 boundary (src/app/io/fault_backend.hpp), in simulated time, world of nominal fidelity, default estimator and
 controller. Unsafe is: duty after the deadline of the fault, motors on after a fall, a wrong tilt that is not
 noticed, faster than 0.6 m/s or half a metre of unasked travel with motors on, motors off without a reason,
@@ -299,7 +300,7 @@ arming by itself: judged in every tick by the plant's truth (src/app/evaluate/fa
 count from the first faulty one. Times are of this machine, not of a BeagleBone. Which one-token changes of
 this code the tests notice: [mutation testing](mutation.md).
 
-| what | wanted | measured | holds |
+| what | required | measured | holds |
 |---|---|---|---|
 """
 
@@ -337,7 +338,12 @@ def main() -> int:
             print("  " + " | ".join(map(str, row)), file=sys.stderr, flush=True)
     table = "".join(f"| {what} | {wanted} | {got} | {HOLDS[ok]} |\n" for what, wanted, got, ok in rows)
     arguments = "".join(f" {argument}" for argument in sys.argv[1:] if argument != "--resume")
-    head = HEAD.format(arguments=arguments, cpus=os.cpu_count(), kernel=os.uname().release)
+    head = HEAD.format(
+        arguments=arguments,
+        commit=output("git", "describe", "--always", "--dirty").strip(),
+        date=date.today(),
+        cpus=os.cpu_count(),
+    )
     left_out = f"\nNot measured this time: {', '.join(options.skip)}.\n" if options.skip else ""
     page = head + table + left_out + "\n" + "\n".join(section for section in sections if section)
     if options.parts:

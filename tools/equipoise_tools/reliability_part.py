@@ -10,7 +10,7 @@ from .paths import repository_root
 ROOT = repository_root()
 BUILD = ROOT / "build" / "host"
 BINARY = BUILD / "equipoise"
-CONFIGS = {"mip": "config/edumip.toml", "mbbr": "config/mbbr.toml"}
+CONFIGS = {"eduMIP": "config/edumip.toml", "MBBR": "config/mbbr.toml"}
 
 
 @dataclass

@@ -83,9 +83,10 @@ def population(options: argparse.Namespace) -> Part:
             f"## {robot}: imperfect robots\nFirst robot {HELD_OUT}, world of full fidelity. Ticks until the "
         )
         part.section += "motors were off or the part was excluded, median / last.\n\n"
-        part.section += f"| fault | {' | '.join(PHASES)} |\n|---|{'---|' * len(PHASES)}\n"
+        part.section += f"| fault | {' | '.join(PHASES)} | unsafe |\n|---|{'---|' * len(PHASES)}---|\n"
         for fault in POPULATION_FAULTS:
-            cells = [found([c for c in cases if (c["fault"], c["phase"]) == (fault, ph)]) for ph in PHASES]
-            part.section += f"| {fault} | {' | '.join(cells)} |\n"
+            of_fault = [c for c in cases if c["fault"] == fault]
+            cells = [found([c for c in of_fault if c["phase"] == phase]) for phase in PHASES]
+            part.section += f"| {fault} | {' | '.join(cells)} | {of_robots(of_fault, 'unsafe')} |\n"
         part.section += "\n" + unsafe_ones(cases)
     return part
