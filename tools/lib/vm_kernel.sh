@@ -32,11 +32,12 @@ prepare_kernel() {
   kernel_version=$(cat "$stamp")
 }
 
-# Debian's kernel has no counter subsystem and no gpio-sim; they build as modules against its headers.
+# Debian's kernel has no counter subsystem, no gpio-sim and no dummy of IIO; they build as modules against its headers.
 collect_module_sources() {
   local drivers=$vm/source-bookworm/drivers
   mkdir -p "$modules_built"
   cp "$drivers"/counter/counter-{core,sysfs,chrdev}.c "$drivers"/counter/counter-*.h "$modules_built/"
+  cp "$drivers"/iio/{*.c,dummy/iio_simple_dummy*.[ch],trigger/iio-trig-sysfs.c} "$modules_built/"
   cp "$drivers"/gpio/gpio-sim.c "$drivers"/gpio/gpiolib.h "$modules_built/"
   cp "$vm/source-bookworm/kernel/irq/irq_sim.c" "$drivers/watchdog/i6300esb.c" "$modules_built/"
   cp "$root"/tests/hardware/kernel/{Kbuild,*.[ch]} "$modules_built/"

@@ -36,7 +36,8 @@ prepare_source() {
   source=$vm/source-$suite
   stamp=$source.stamp
   parts=('drivers/gpio/*.[ch]' 'kernel/irq/irq_sim.c' 'drivers/counter/*.[ch]'
-    'drivers/watchdog/i6300esb.c'
+    'drivers/iio/industrialio-configfs.c' 'drivers/iio/industrialio-sw-device.c' 'drivers/iio/dummy/iio_simple_dummy*'
+    'drivers/iio/trigger/iio-trig-sysfs.c' 'drivers/watchdog/i6300esb.c'
     'drivers/net/can/sja1000/*.h' 'arch/arm/boot/dts/*am33*' 'arch/arm/boot/dts/*tps65217*' 'include/dt-bindings/*'
     'include/uapi/linux/input-event-codes.h')
   [ "$(cat "$stamp" 2>/dev/null)" != "${parts[*]}" ] || return 0
