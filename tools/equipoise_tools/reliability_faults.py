@@ -20,9 +20,10 @@ def cell(case: dict) -> str:
 
 
 def table(told: dict) -> str:
-    """A row for each fault, a column for each phase."""
+    """A row for each fault, a column for each phase; none for a phase in which all stay off."""
     cells = {(case["fault"], case["phase"]): cell(case) for case in told["cases"]}
     faults, phases = (list(dict.fromkeys(key)) for key in zip(*cells, strict=True))
+    phases = [p for p in phases if not all(cells[f, p].startswith("stays off") for f in faults)]
     rows = [f"| fault | {' | '.join(phases)} |", "|---|" + "---|" * len(phases)]
     for fault in faults:
         named = " | ".join(cells[fault, phase] for phase in phases)

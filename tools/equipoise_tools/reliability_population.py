@@ -38,12 +38,17 @@ def found(cases: list[dict]) -> str:
     return f"{text}; {never} of {len(cases)} not" if never else text
 
 
-def of_robots(cases: list[dict], what: str) -> str:
-    """Cases of one robot are not independent, robots are: the interval counts those with any such case."""
+def hit_robots(cases: list[dict], what: str) -> tuple[int, int, float]:
+    """Cases of one robot are not independent, robots are: how many have any such case, of how many, and the
+    upper end of their share in percent."""
     robots = {c["robot"] for c in cases}
     hit = {c["robot"] for c in cases if c[what]}
-    _, high = wilson(len(hit), len(robots))
-    return f"{len(hit)} of {len(robots)} robots, below {100 * high:.1f} % of them (95 %)"
+    return len(hit), len(robots), 100 * wilson(len(hit), len(robots))[1]
+
+
+def of_robots(cases: list[dict], what: str) -> str:
+    hit, robots, high = hit_robots(cases, what)
+    return f"{hit} of {robots} robots, below {high:.1f} % of them (95 %)"
 
 
 def unsafe_ones(cases: list[dict]) -> str:
@@ -82,11 +87,13 @@ def population(options: argparse.Namespace) -> Part:
         part.section += (
             f"## {robot}: imperfect robots\nFirst robot {HELD_OUT}, world of full fidelity. Ticks until the "
         )
-        part.section += "motors were off or the part was excluded, median / last.\n\n"
+        part.section += "motors were off or the part was excluded, median / last; robots with an unsafe "
+        part.section += "run, their share with 95 %.\n\n"
         part.section += f"| fault | {' | '.join(PHASES)} | unsafe |\n|---|{'---|' * len(PHASES)}---|\n"
         for fault in POPULATION_FAULTS:
             of_fault = [c for c in cases if c["fault"] == fault]
             cells = [found([c for c in of_fault if c["phase"] == phase]) for phase in PHASES]
-            part.section += f"| {fault} | {' | '.join(cells)} | {of_robots(of_fault, 'unsafe')} |\n"
+            hit, _, high = hit_robots(of_fault, "unsafe")
+            part.section += f"| {fault} | {' | '.join(cells)} | {hit}, < {high:.1f} % |\n"
         part.section += "\n" + unsafe_ones(cases)
     return part
