@@ -330,7 +330,7 @@ class PackedFilter {
   void forget_unseen(Core<Real>& core) noexcept {
     constexpr int kAngles = Model::kTurnings;
     for (int i = 0; i < kAngles; ++i) {
-      const auto row = static_cast<std::size_t>(Model::kWheel + i);
+      const auto row = static_cast<std::size_t>(Model::kWheel) + static_cast<std::size_t>(i);
       if (core.weight[row] != Real{0} || !(row_variance_[row] > 1.0)) continue;
       const Turnings w = turning_rows_.row(Model::kWheel + i);
       const Turnings d = of_wheel_.col(i);
