@@ -19,7 +19,7 @@ def cell(case: dict) -> str:
     return f"stays off: {case['reasons']}"
 
 
-def table(told: dict) -> str:
+def table(told: dict, described: bool = True) -> str:
     """A row for each fault, a column for each phase; none for a phase in which all stay off."""
     cells = {(case["fault"], case["phase"]): cell(case) for case in told["cases"]}
     faults, phases = (list(dict.fromkeys(key)) for key in zip(*cells, strict=True))
@@ -27,7 +27,7 @@ def table(told: dict) -> str:
     rows = [f"| fault | {' | '.join(phases)} |", "|---|" + "---|" * len(phases)]
     for fault in faults:
         named = " | ".join(cells[fault, phase] for phase in phases)
-        rows.append(f"| {fault}: {told['faults'][fault]} | {named} |")
+        rows.append(f"| {fault}{': ' + told['faults'][fault] if described else ''} | {named} |")
     return "\n".join(rows) + "\n"
 
 
@@ -48,5 +48,5 @@ def faults(options: argparse.Namespace) -> Part:
         holds = soak["hours"] >= 10 and soak["unsafe"] == soak["unexplained"] == 0
         part.rows.append((f"{robot}: soak", "10 h, no fall that its fault does not explain", ended, holds))
         to_explain = "".join(f"- {json.dumps(run)}\n" for run in soak["to_explain"])
-        part.section += f"## {robot}\n{to_explain}\n{table(told)}\n"
+        part.section += f"## {robot}\n{to_explain}\n{table(told, described=not part.section)}\n"
     return part

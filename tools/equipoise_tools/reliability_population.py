@@ -52,9 +52,14 @@ def of_robots(cases: list[dict], what: str) -> str:
 
 
 def unsafe_ones(cases: list[dict]) -> str:
-    """Each by name: it can be run again alone (`equipoise campaign --robot N --fault NAME --phase NAME`)."""
-    named = [f"- {c['fault']}, {c['phase']}, robot {c['robot']}: {c['why']}\n" for c in cases if c["unsafe"]]
-    return f"Unsafe:\n\n{''.join(named)}\n" if named else ""
+    """Of each fault in each phase how many, and one robot that can be run again alone
+    (`equipoise campaign --robot N --fault NAME --phase NAME`)."""
+    alike: dict[str, list[int]] = {}
+    for c in cases:
+        if c["unsafe"]:
+            alike.setdefault(f"{c['fault']}, {c['phase']}: {c['why']}", []).append(c["robot"])
+    named = [f"- {kind}: {len(robots)} ({robots[0]})\n" for kind, robots in alike.items()]
+    return f"Unsafe (and the first robot):\n\n{''.join(named)}\n" if named else ""
 
 
 def population(options: argparse.Namespace) -> Part:
