@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
+from datetime import date
 from pathlib import Path
 
 from equipoise_robot.errors import UserError
 
-__all__ = ["UserError", "binary", "import_lcm_types", "repository_root"]
+__all__ = ["UserError", "binary", "commit_and_date", "import_lcm_types", "repository_root"]
 
 
 def repository_root() -> Path:
     return Path(__file__).resolve().parents[2]
+
+
+def commit_and_date() -> tuple[str, str]:
+    """For a report's head: of the code that measures, and today."""
+    command = ["git", "-C", str(repository_root()), "describe", "--always", "--dirty"]
+    told = subprocess.run(command, capture_output=True, text=True, check=False).stdout
+    return told.strip() or "no commit", str(date.today())
 
 
 def binary() -> Path:

@@ -1,4 +1,4 @@
-"""What the firmware would have done beside real robots: docs/reality.md from their logs; tools/reality."""
+"""What the firmware would have done beside real robots: docs/reports/reality.md; tools/reality."""
 
 from __future__ import annotations
 
@@ -13,12 +13,21 @@ from pathlib import Path
 from typing import Any
 
 from .entry import leave
-from .paths import repository_root
+from .paths import commit_and_date, repository_root
 from .table import matlab
 
 MAPS = Path("config/real/maps")
-PAGE, DATA = Path("docs/reality.md"), Path("docs/reality.json")
-START = "<!-- tables: ./tools/reality FOLDER --write -->\n"
+PAGE, DATA = Path("docs/reports/reality.md"), Path("docs/reports/reality.json")
+HEAD = """# Real robots: tables
+Written by `tools/reality FOLDER --write` at {version}, {date}. What the columns mean and why the numbers are
+what they are: [reality.md](../reality.md).
+
+## Shadow
+"""
+
+
+def maps_of(root: Path) -> dict[str, dict[str, Any]]:
+    return {file.stem: tomllib.loads(file.read_text()) for file in sorted((root / MAPS).glob("*.toml"))}
 
 
 def found(folder: Path, source: dict[str, str]) -> Path | None:
@@ -103,10 +112,6 @@ def shown(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
     return "-" if value is None else f"{scale * value:.{digits}f}"
 
 
-def pair(before: dict[str, Any] | None, now: dict[str, Any], text) -> str:
-    return f"{text(before) if before else '-'} -> {text(now)}"
-
-
 def causes(shadow: dict[str, Any]) -> str:
     alarms = shadow["alarms"]
     if not alarms:
@@ -115,8 +120,7 @@ def causes(shadow: dict[str, Any]) -> str:
 
 
 def nis(shadow: dict[str, Any]) -> str:
-    values = shadow.get("nis", {}).values()
-    return f"{min(values):.2f} to {max(values):.2f}" if values else "-"
+    return ", ".join(f"{name} {value:.2f}" for name, value in shadow.get("nis", {}).items()) or "-"
 
 
 def ahead(shadow: dict[str, Any], what: str) -> str:
@@ -136,24 +140,18 @@ def noise(shadow: dict[str, Any], sensor: str) -> str:
     )
 
 
-def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
-    now, before = data["now"], data["before"]
+def page_of(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
     rows = [
-        "| log | balancing, s | alarms | NIS per row, least to largest | tilt against smoother, mrad |",
+        "| log | balancing, s | alarms | NIS per row | tilt against smoother, mrad |",
         "|---|---|---|---|---|",
     ]
     ahead_rows = ["| log | tilt | wheels |", "|---|---|---|"]
     noise_rows = ["| log | gyro x y z, rad/s | accelerometer x y z, m/s2 |", "|---|---|---|"]
     origin = ["| log | repository, commit | path | licence | sha256 |", "|---|---|---|---|---|"]
-    for name, s in now.items():
-        b = before.get(name)
-        tilt = pair(b, s, lambda x: shown(x["tilt_std_rad"], 1e3, 1))
-        rows.append(f"| {name} | {s['judged_s']:.1f} | {pair(b, s, causes)} | {pair(b, s, nis)} | {tilt} |")
-        ahead_rows.append(
-            f"| {name} | "
-            + " | ".join(pair(b, s, lambda x, w=w: ahead(x, w)) for w in ("tilt", "wheel"))
-            + " |"
-        )
+    for name, s in data["now"].items():
+        tilt = shown(s["tilt_std_rad"], 1e3, 1)
+        rows.append(f"| {name} | {s['judged_s']:.1f} | {causes(s)} | {nis(s)} | {tilt} |")
+        ahead_rows.append(f"| {name} | {ahead(s, 'tilt')} | {ahead(s, 'wheel')} |")
         noise_rows.append(f"| {name} | {noise(s, 'gyro')} | {noise(s, 'accel')} |")
     known_rows = [
         "| log | fitted | rest: configured | identified | persistence | constant rate |",
@@ -182,15 +180,15 @@ def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
         for file, digest in content["sha256"].items():
             path = Path(source["path"]).parent / file
             origin.append(f"| {name} | {link} | {path} | {source['licence']} | `{digest[:16]}` |")
-    return "\n".join(
+    return HEAD.format(**data) + "\n".join(
         [
-            f"Firmware {data['version']} (earlier: {data['before_version'] or '-'}); earlier -> now.\n",
             *rows,
             "\n0.1 s ahead, error (RMS, mrad): model / persistence / constant rate.\n",
             *ahead_rows,
             "\nNoise of the samples while balancing (second differences, as white noise).\n",
             *noise_rows,
-            "\n`tools/lab identify`, SI, first half fitted; 0.1 s ahead in the rest: tilt, wheels, mrad.\n",
+            "\n## Identified\n",
+            "`tools/lab identify`, SI, first half fitted; 0.1 s ahead in the rest: tilt, wheels, mrad.\n",
             *known_rows,
             "\n`equipoise identify motor`, 95 % intervals.\n",
             *motor_rows(data.get("motors", {})),
@@ -204,20 +202,14 @@ def tables(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(prog="tools/reality", description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--before", action="store_true")
     parser.add_argument("--write", action="store_true")
     arguments = parser.parse_args()
     root = repository_root()
     data_file = root / DATA
-    data = (
-        json.loads(data_file.read_text())
-        if data_file.exists()
-        else {"before": {}, "now": {}, "before_version": None}
-    )
-    files = sorted((root / MAPS).glob("*.toml"))
-    maps = {file.stem: tomllib.loads(file.read_text()) for file in files}
+    data = json.loads(data_file.read_text()) if data_file.exists() else {"now": {}}
+    maps = maps_of(root)
     done = {}
-    for file in files:
+    for file in sorted((root / MAPS).glob("*.toml")):
         table = found(arguments.folder.resolve(), maps[file.stem]["source"])
         if table is None:
             print(f"{file.stem}: not in {arguments.folder}", file=sys.stderr)
@@ -233,25 +225,19 @@ def main() -> int:
         if found_motors is not None:
             data.setdefault("motors", {})[file.stem] = found_motors
     if not done and not data.get("identified"):
-        print(f"{arguments.folder}: holds none of the logs of docs/reality.md", file=sys.stderr)
+        print(f"{arguments.folder}: holds none of the logs of docs/reports/reality.md", file=sys.stderr)
         return 1
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=root, capture_output=True, text=True, check=False
-    )
-    data["version"] = commit.stdout.strip() or "-"
+    data["version"], data["date"] = commit_and_date()
     data["now"] |= done
-    if arguments.before:
-        data["before"], data["before_version"] = dict(data["now"]), data["version"]
     for shadow in done.values():
         for key in ("log", "config", "version"):
             shadow.pop(key, None)
-    page = tables(data, maps)
+    page = page_of(data, maps)
     if not arguments.write:
         print(page)
         return 0
     data_file.write_text(json.dumps(data, sort_keys=True) + "\n")
-    text = (root / PAGE).read_text()
-    (root / PAGE).write_text(text[: text.index(START)] + START + "\n" + page)
+    (root / PAGE).write_text(page)
     return 0
 
 
