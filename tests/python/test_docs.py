@@ -1,5 +1,6 @@
 """What hand-written pages name exists: options, keys, files, lines, tests; what they quote is there."""
 
+import math
 import re
 import shlex
 import subprocess
@@ -21,6 +22,9 @@ _NUMBER_LINK = re.compile(
     r"\[([^\]]*\d[^\]]*)\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)"
 )
 _CITED = re.compile(r"\[[^\]]*\]\(((?:\.\./|docs/)*(?:reports|experiments)/[\w./-]+\.md)(?:#[\w-]+)?\)")
+_SOURCE_NUMBER = re.compile(
+    r"\[([^\]]*\d[^\]]*)\]\(((?:\.\./|docs/)*[\w./-]+\.(?:hpp|cpp|h|c|toml|py|json))\)"
+)
 _BARE = re.compile(r"[\w-]+\.(?:py|cpp|hpp)")  # a source without its folder
 MADE_BY_BUILD = ("build/", "logs/")
 OF_DEBIAN = ("/", "~")
@@ -198,6 +202,25 @@ def wrong_quotes(page: Path, text: str) -> list[str]:
 
 
 @cache
+def numerals(path: Path) -> frozenset[float]:
+    text = path.read_text() if path.is_file() else ""
+    found = re.findall(r"(?<![\w.])\d[\d']*(?:\.\d+)?(?:e-?\d+)?", text)
+    return frozenset(float(number.replace("'", "")) for number in found)
+
+
+def wrong_constants(page: Path, text: str) -> list[str]:
+    """Numbers in a link to a source, `[12 mrad](x.hpp)`, stand in it: as they are, or in SI."""
+    found = []
+    for said, link in _SOURCE_NUMBER.findall(text):
+        there = numerals((page.parent / link).resolve())
+        for number, unit in re.findall(r"(?<![\w.])(\d+(?:\.\d+)?)(?![\w.]) ?(%|m(?=rad))?", said):
+            si = float(number) * {"%": 0.01, "m": 0.001}.get(unit, 1.0)
+            if not any(math.isclose(si, other) for other in there):
+                found.append(f"{link} does not have {number}{unit and ' ' + unit}")
+    return found
+
+
+@cache
 def words_of_code(root: Path) -> frozenset[str]:
     files = tree_of_git(root).ending(".py", ".cpp", ".hpp")
     ours = [name for name in files if name.startswith(("python/", "examples/", "src/"))]
@@ -221,7 +244,7 @@ def complaints(root: Path, page: Path) -> list[str]:
             wrong += wrong_options(root, said)
         found += [f"{page.name}:{number}: {what}" for what in wrong]
     whole = wrong_lines(root, text) + wrong_tests(root, text) + wrong_names(root, text)
-    whole += wrong_quotes(page, text)
+    whole += wrong_quotes(page, text) + wrong_constants(page, text)
     return found + [f"{page.name}: {what}" for what in whole]
 
 
@@ -251,17 +274,21 @@ def test_what_pages_name_exists(root):
         ("[0.00777 rad](reports/as-built.md)", "does not say 0.00777"),
         ("- Of 987 robots all stood\n  ([report](reports/as-built.md)).", "does not say 987"),
         ("| robots | 77.7 % of 1000 ([report](reports/as-built.md)) |", "does not say 77.7"),
+        ("| bound | [18.7 nats](../include/equipoise/estimate/sensor_faults.hpp) |", "does not have 18.7"),
+        ("[13 mrad](../src/robots/mbbr/estimators.cpp)", "does not have 13 m"),
         (
             "`equipoise sim --yaw-hz 3`, `safety.max_tilt_rad`, `config/mbbr.toml`, CMakeLists.txt:1\n"
-            "[0.0076 rad](reports/as-built.md) `test_links.py::test_every_link_leads_somewhere`",
+            "[0.0076 rad](reports/as-built.md) [12 mrad](../src/robots/mbbr/estimators.cpp) "
+            "`test_links.py::test_every_link_leads_somewhere`",
             None,
         ),
     ],
 )
 def test_a_wrong_name_is_found(root, tmp_path, line, complaint):
-    for folder in ("reports", "experiments"):
-        (tmp_path / folder).symlink_to(root / "docs" / folder)
-    page = tmp_path / "page.md"
+    (tmp_path / "docs").mkdir()
+    for folder in ("docs/reports", "docs/experiments", "include", "src"):
+        (tmp_path / folder).symlink_to(root / folder)
+    page = tmp_path / "docs/page.md"
     page.write_text(f"# Page\n{line}\n")
     found = complaints(root, page)
     assert (len(found) == 1 and complaint in found[0]) if complaint else found == []
@@ -306,3 +333,40 @@ def test_an_old_word_is_found(tmp_path):
 def test_hand_written_pages_are_at_most_thirty_thousand_words(root):
     names = [name for name in pages(tree_of_git(root)) if name != "docs/performance.md"]  # generated
     assert sum(len((root / name).read_text(encoding="utf-8").split()) for name in names) <= 30000
+
+
+def cited_by(root: Path, shown: str) -> str:
+    """Text of the reports and tests that a cell names."""
+    files = [root / "docs" / name for name in re.findall(r"\((experiments/[\w.]+)\)", shown)]
+    tests = [file for kind in ("*.py", "*.cpp") for file in sorted((root / "tests").rglob(kind))]
+    names = re.findall(r"[\w/]+\.(?:py|cpp)|(?<=[`:])\w+(?=`)", shown)
+    for name in names:
+        is_test = re.compile(rf"def {name}\(|TEST\w*\(\w+, {name}\)")
+        files += [f for f in tests if str(f).endswith(f"/{name}") or is_test.search(f.read_text())]
+    return "\n".join(file.read_text() for file in files)
+
+
+def errata_without_source(root: Path, text: str) -> list[str]:
+    """Numbers of the right form, and of how it was found, stand in what shows them or are [T]'s."""
+    published, found, shown = (root / "config/published.toml").read_text(), [], ""
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+        if len(cells) != 5 or cells[4] in ("shown by", "---"):
+            continue
+        shown = shown if cells[4] == "the same" else cited_by(root, cells[4])
+        there = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e-?\d+)?", "\n".join((shown, published, cells[1])))
+        places = r"\((?:A\.)?\d\.?\d*\)|Tables? [\d.]+(?:, \d\.\d)*|Fig\. [\d.]+"
+        said = re.sub(places, " ", " ".join(cells[2:4]))
+        for number in re.findall(r"(?<![\w.\[])\d+(?:\.\d+)?(?!\w)", said):
+            half = 0.5000001 * 10.0 ** -len(number.partition(".")[2])
+            share = 0.01 if f"{number} %" in said else 1.0
+            if not any(abs(float(other) - share * float(number)) <= share * half for other in there):
+                found.append(f"{cells[0]}: {number}")
+    return found
+
+
+def test_numbers_of_the_errata_stand_in_what_shows_them(root):
+    text = (root / "docs/errata.md").read_text()
+    assert errata_without_source(root, text) == []
+    planted = text.replace("(1.002 with plus)", "(1.777 with plus)")
+    assert errata_without_source(root, planted) == ["(6.29): 1.777"]
