@@ -236,7 +236,9 @@ def main() -> int:
     if not arguments.write:
         print(page)
         return 0
-    data_file.write_text(json.dumps(data, sort_keys=True) + "\n")
+    exact = json.dumps(data, sort_keys=True)
+    kept = json.loads(exact, parse_float=lambda number: float(f"{float(number):.6g}"))
+    data_file.write_text(json.dumps(kept, separators=(",", ":")) + "\n")
     (root / PAGE).write_text(page)
     return 0
 
