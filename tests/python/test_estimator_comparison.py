@@ -171,3 +171,12 @@ def test_the_page_shows_what_the_data_say(root):
     text = (root / "docs/reports/estimators.md").read_text()
     shown = text.split(page.BEGIN, 1)[1].split(page.END, 1)[0].strip()
     assert shown == page.tables(measure.read(root / "docs/reports/estimators.parquet")).strip()
+
+
+def test_new_tables_bring_their_commit_and_date(tmp_path):
+    path = tmp_path / "estimators.md"
+    path.write_text(f"# T\nMeasured at 1234567, 2026-01-02.\n{page.BEGIN}\nold\n{page.END}\n")
+    page.insert(path, "kept")
+    assert "Measured at 1234567, 2026-01-02." in path.read_text() and "old" not in path.read_text()
+    page.insert(path, "new", "89abcde-dirty, 2026-03-04")
+    assert path.read_text() == f"# T\nMeasured at 89abcde-dirty, 2026-03-04.\n{page.BEGIN}\nnew\n{page.END}\n"

@@ -32,7 +32,7 @@ from .campaign_page import (
 from .campaign_statistics import survival_over_time
 from .experiments.runs import LOSSLESS
 from .parameters import ROBOTS
-from .paths import UserError, repository_root
+from .paths import UserError, commit_and_date, repository_root
 from .style import plt
 from .trials import run_trials
 
@@ -126,9 +126,9 @@ def draw_population(rows: list[dict], out: Path) -> None:
 
 
 HEAD = """# Population of robots as built: tables
-Written by `python -m equipoise_tools.as_built`. Each robot is drawn from its type's population; in brackets:
-95 % interval; errors are of those upright to the end, after 5 s. What the numbers mean:
-[as-built.md](../as-built.md).
+Written by `python -m equipoise_tools.as_built`; each part has its commit and date. Each robot is drawn from
+its type's population; in brackets: 95 % interval; errors are of those upright to the end, after 5 s. What the
+numbers mean: [as-built.md](../as-built.md).
 
 """
 STEPS_HEAD = "## Filter and controller, step by step\n"
@@ -159,6 +159,7 @@ def campaign_part(rows: list[dict], settings: dict, made: str) -> str:
 
 def steps_part(found: list[tuple[str, list[dict]]], first: int) -> str:
     where = f"{POINT[0]:g} Hz and {POINT[1]:g} m/s, {DURATION_S:.0f} s, world `{WORLD}`"
+    where += ", at {}, {}".format(*commit_and_date())
     robots = f"The same {len(found[0][1])} robots ({first} to {first + len(found[0][1]) - 1}), {where}.\n\n"
     picture = "\n\n![Robots still upright over time, step by step](as_built_steps.png)\n"
     return STEPS_HEAD + robots + "\n".join(steps_table(found)) + picture

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import shlex
-import subprocess
 from collections import Counter
-from datetime import date
 from pathlib import Path
 
 import numpy as np
 
 from .campaign_statistics import influences, quantile_interval, survival_over_time, wilson
-from .paths import repository_root
+from .paths import commit_and_date
 
 WORST = 12
 
@@ -190,14 +188,9 @@ def made_by(rows: list[dict], settings: dict) -> str:
         words += [f"--{key}", settings[key]] if settings[key] else []
     for text in settings["set"]:
         words += ["--set", text]
-    commit = subprocess.run(
-        ["git", "-C", repository_root(), "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     made = f"Made by `{shlex.join(words)}`"
-    return f"{made} at {commit or 'no commit'}, {date.today()}; each robot's seed is its number."
+    commit, today = commit_and_date()
+    return f"{made} at {commit}, {today}; each robot's seed is its number."
 
 
 def engine_of(settings: dict) -> str:

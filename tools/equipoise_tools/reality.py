@@ -232,12 +232,12 @@ def main() -> int:
     for shadow in done.values():
         for key in ("log", "config", "version"):
             shadow.pop(key, None)
-    page = page_of(data, maps)
+    exact = json.dumps(data, sort_keys=True)
+    kept = json.loads(exact, parse_float=lambda number: float(f"{float(number):.6g}"))
+    page = page_of(kept, maps)
     if not arguments.write:
         print(page)
         return 0
-    exact = json.dumps(data, sort_keys=True)
-    kept = json.loads(exact, parse_float=lambda number: float(f"{float(number):.6g}"))
     data_file.write_text(json.dumps(kept, separators=(",", ":")) + "\n")
     (root / PAGE).write_text(page)
     return 0

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from .count_page import ROBOTS
 from .entry import leave
-from .paths import UserError, repository_root
+from .paths import UserError, commit_and_date, repository_root
 
 PAGE = Path("docs/reports/speed.md")
 SHORTEST_S, SHORT_S, LONG_S = 0.1, 20, 220
@@ -280,7 +280,8 @@ def number(value: float, digits: int) -> str:
 def page(result: dict) -> str:
     lines = [
         "# Speed of the simulation",
-        f"Written by `./tools/speed --write`. CPU time of one core but where said; median of "
+        "Written by `./tools/speed --write` at {}, {}.".format(*commit_and_date()),
+        f"CPU time of one core but where said; median of "
         f"{result['rounds']} interleaved rounds, least and most. Load of the machine at the end: "
         f"{result['load']:.1f} on {result['cores_of_the_machine']} cores. Counts that do not depend on it: "
         "[performance.md](../performance.md).",

@@ -21,7 +21,7 @@ from .entry import leave
 from .experiments.control import CONDITIONS
 from .experiments.table_6_1 import WITHIN
 from .inference import Draw, Inference, effective, quantiles, weights_of
-from .paths import UserError, repository_root
+from .paths import UserError, commit_and_date, repository_root
 from .which_world import DURATION_S, FAR, LOST_S, PARAMETERS, Row, rows_of_t, run_rows, trials, world_settings
 
 PAGE = "docs/reports/which-world.md"
@@ -182,9 +182,7 @@ def page(found: Inference, firmware: list[str]) -> str:
         f"{FAR:g} at most; kept are {found.kept[0].distance:.2f} to {found.kept[-1].distance:.2f}. "
         "The attitude of DMP+KF is put in with 0.010 rad of noise.",
         "",
-        "```",
-        "tools/lab world --write",
-        "```",
+        "Written by `tools/lab world --write` at {}, {}.".format(*commit_and_date()),
         "",
         "## What the kept draws say",
         "",

@@ -14,7 +14,7 @@ from equipoise_robot import _core
 from ..campaign import Progress
 from ..campaign_statistics import wilson
 from ..entry import leave
-from ..paths import UserError, repository_root
+from ..paths import UserError, commit_and_date, repository_root
 from . import picture, policy, runs, score, tuning
 from .peers import PEERS, available
 from .workers import Workers
@@ -184,6 +184,7 @@ def main(words: list[str] | None = None) -> int:
             return 0
         rows = benchmark(given)
         about = {**about_of(given, tuning.found()), "robots": given.robots}
+        about["commit"], about["date"] = commit_and_date()
         exact = json.dumps(score.scores(rows))
         told = json.loads(exact, parse_float=lambda number: round(float(number), 4))
         path = given.out / "scores.json"

@@ -102,7 +102,8 @@ def page(told: list[dict], about: dict) -> str:
     robots = about["robots"]
     lines = [
         "# The field's benchmark, measured",
-        "Written by `./tools/benchmark --write`; what it means: [benchmark.md](../benchmark.md).",
+        f"Written by `./tools/benchmark --write` at {about['commit']}, {about['date']}; what it means: "
+        "[benchmark.md](../benchmark.md).",
         "",
         f"{robots} robots of each type, {about['first_robot']} to {about['first_robot'] + robots - 1}, world "
         f"`{about['fidelity']}`, one run at each point and in each engine; version {about['version']}. "

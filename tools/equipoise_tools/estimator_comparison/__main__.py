@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from ..entry import leave
-from ..paths import UserError, repository_root
+from ..paths import UserError, commit_and_date, repository_root
 from . import measure, page
 
 CASES = ((0.0, 0.3), (1.0, 0.2), (2.0, 0.2), (3.0, 0.2))  # Hz, m/s
@@ -47,7 +47,8 @@ def main(arguments: list[str] | None = None) -> int:
     page.draw(rows, options.out)
     text = page.tables(rows)
     print(text)
-    page.insert(options.out / "estimators.md", text)
+    measured = None if options.from_data else ", ".join(commit_and_date())
+    page.insert(options.out / "estimators.md", text, measured)
     return 0
 
 

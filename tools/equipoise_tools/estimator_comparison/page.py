@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -125,13 +126,16 @@ def tables(rows: list[Row]) -> str:
     return "\n\n".join(f"{about}\n\n{table}" for about, table in parts)
 
 
-def insert(path: Path, text: str) -> None:
+def insert(path: Path, text: str, measured: str | None = None) -> None:
+    """`measured`: commit and date; without, those that the page has."""
     if not path.exists():
         return
     page = path.read_text()
     if BEGIN not in page or END not in page:
         raise UserError(f"{path}: has no '{BEGIN}' ... '{END}' for the tables")
     before, rest = page.split(BEGIN, 1)
+    if measured:
+        before = re.sub(r"Measured at \S+, [\d-]+\.", f"Measured at {measured}.", before)
     path.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END, 1)[1]}")
 
 
