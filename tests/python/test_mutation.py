@@ -7,7 +7,7 @@ from equipoise_tools.mutation.__main__ import Campaign, drawn, kept, unseen
 from equipoise_tools.mutation.bench import Worker
 from equipoise_tools.mutation.generate import mutants
 from equipoise_tools.mutation.page import write_page
-from equipoise_tools.mutation.rooms import ROOMS, Room, Stage
+from equipoise_tools.mutation.parts import PARTS, Part, Stage
 from equipoise_tools.mutation.store import OLDER_TESTS, Store
 from equipoise_tools.mutation.store import tests_of as state_of_tests
 
@@ -35,7 +35,7 @@ build tests/drivers/CMakeFiles/own_tests.dir/limit_test.cpp.o: cc ../../tests/dr
 build tests/drivers/own_tests: link tests/drivers/CMakeFiles/own_tests.dir/limit_test.cpp.o | limit.o
 # of drivers/limit.c.o
 """
-OWN = Room(("drivers/limit.c",), (Stage("tests/drivers/own_tests", ("drivers/limit_test.cpp",)),))
+OWN = Part(("drivers/limit.c",), (Stage("tests/drivers/own_tests", ("drivers/limit_test.cpp",)),))
 
 
 def project(root, folder):
@@ -71,7 +71,7 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     # Equal for every x; what the compiler makes of it decides whether it counts.
     assert fate[(3, "relation", "> → >=")] in ("same_code", "survived")
 
-    monkeypatch.setitem(ROOMS, "own", OWN)
+    monkeypatch.setitem(PARTS, "own", OWN)
     page, unexplained = write_page({"own": told}, {}, 1, tmp_path)
     assert "drivers/limit.c:3 10 → 11   [if (x > 10) return 10;]" in unexplained
     assert "**none yet**" in page
@@ -118,9 +118,9 @@ def test_it_kills_what_tests_notice_and_finds_what_they_do_not(root, tmp_path, m
     row = next(line for line in page.splitlines() if line.startswith("| own |"))
     assert "| 2 without 1 |" in row and row.endswith(" |  |")
 
-    # A room that is not measured again keeps its row and its survivors, in the order of the rooms.
-    monkeypatch.delitem(ROOMS, "drivers")  # it would have the same source
-    monkeypatch.setitem(ROOMS, "other", Room(("drivers/limit.h",), OWN.stages))
+    # A part that is not measured again keeps its row and its survivors, in the order of the parts.
+    monkeypatch.delitem(PARTS, "drivers")  # it would have the same source
+    monkeypatch.setitem(PARTS, "other", Part(("drivers/limit.h",), OWN.stages))
     both, _ = write_page({"own": told[3:], "other": []}, {}, 2, tmp_path, {("own", 1): []})
     again, _ = write_page({"other": []}, {}, 7, tmp_path, earlier=both)
     assert again == both
@@ -186,13 +186,13 @@ std::vector<int> f(const int* p, int&& q) {
         assert mutant.of(text) != text
 
 
-def test_every_room_has_mutants_and_tests(root):
-    for name, room in ROOMS.items():
-        paths = room.paths(root)
+def test_every_part_has_mutants_and_tests(root):
+    for name, part in PARTS.items():
+        paths = part.paths(root)
         assert sum(len(mutants(path.read_text())) for path in paths) >= 10, name
         for path in paths:
-            assert any(stage.is_for(str(path.relative_to(root))) for stage in room.stages), path
+            assert any(stage.is_for(str(path.relative_to(root))) for stage in part.stages), path
         tests = {str(p.relative_to(root / "tests")) for p in (root / "tests").rglob("*.cpp")}
-        for stage in room.stages:
+        for stage in part.stages:
             for pattern in stage.tests:
                 assert "*" in pattern or pattern in tests, pattern

@@ -17,16 +17,16 @@ from ..paths import UserError, repository_root
 from .bench import Build, Outcome, Worker
 from .generate import Mutant, mutants
 from .page import reasons, write_page
-from .rooms import ROOMS, Room, Stage
+from .parts import PARTS, Part, Stage
 from .store import Store, key_of, tests_of
 
-SAMPLE = 40  # mutants per room
+SAMPLE = 40  # mutants per part
 
 
-def drawn(room: Room, name: str, root: Path, sample: int, seed: int) -> list[tuple[Path, str, Mutant]]:
-    """A random sample of a room's mutants; a larger one contains a smaller one."""
+def drawn(part: Part, name: str, root: Path, sample: int, seed: int) -> list[tuple[Path, str, Mutant]]:
+    """A random sample of a part's mutants; a larger one contains a smaller one."""
     every = []
-    for path in room.paths(root):
+    for path in part.paths(root):
         text = path.read_text()
         file = path.relative_to(root)
         every += [(file, text, mutant) for mutant in mutants(text)]
@@ -35,7 +35,7 @@ def drawn(room: Room, name: str, root: Path, sample: int, seed: int) -> list[tup
 
 
 def unseen(
-    room: Room,
+    part: Part,
     name: str,
     root: Path,
     sample: int,
@@ -45,11 +45,11 @@ def unseen(
 ) -> list[tuple[Path, str, Mutant]]:
     """A sample of another seed without the mutants of the samples for which tests were written, whether these
     were drawn of all mutants or without the samples before them."""
-    every = drawn(room, name, root, 0, seed)
-    known = {each for one in learnt for each in drawn(room, name, root, learnt_sample, one)}
+    every = drawn(part, name, root, 0, seed)
+    known = {each for one in learnt for each in drawn(part, name, root, learnt_sample, one)}
     if learnt:
         last, before = learnt[-1], learnt[:-1]
-        known |= set(unseen(room, name, root, learnt_sample, last, before, learnt_sample))
+        known |= set(unseen(part, name, root, learnt_sample, last, before, learnt_sample))
     return [each for each in every if each not in known][:sample]
 
 
@@ -91,10 +91,10 @@ class Campaign:
                 self.codes[file] = worker.unchanged_code(file, text)
         return self.codes[file]
 
-    def judge(self, room: Room, tests: str, file: Path, text: str, mutant: Mutant) -> Outcome:
+    def judge(self, part: Part, tests: str, file: Path, text: str, mutant: Mutant) -> Outcome:
         worker = self.workers.get()
         try:
-            stages = [stage for stage in room.stages if stage.is_for(str(file))]
+            stages = [stage for stage in part.stages if stage.is_for(str(file))]
             same = self.unchanged_code(worker, file, text)
             outcome = worker.judge(stages, file, text, mutant, self.limit, same)
         finally:
@@ -104,14 +104,14 @@ class Campaign:
         return outcome
 
     def go(
-        self, name: str, room: Room, chosen: list[tuple[Path, str, Mutant]]
+        self, name: str, part: Part, chosen: list[tuple[Path, str, Mutant]]
     ) -> list[tuple[Path, str, Mutant, Outcome]]:
-        tests = tests_of(room, self.root)
+        tests = tests_of(part, self.root)
         known = [self.store.known(key_of(file, mutant.of(text)), tests) for file, text, mutant in chosen]
         print(f"{name}: {len(chosen)} mutants, {sum(map(bool, known))} known", file=sys.stderr, flush=True)
         with ThreadPoolExecutor(self.jobs) as pool:
             waiting = [
-                None if was else pool.submit(self.judge, room, tests, *each)
+                None if was else pool.submit(self.judge, part, tests, *each)
                 for each, was in zip(chosen, known, strict=True)
             ]
             try:
@@ -130,7 +130,7 @@ def main() -> int:
         "docs/reports/mutation.md when no part is named. Exit status: 1 when a survivor has no reason in "
         "tests/mutation/reasons.toml.",
     )
-    parser.add_argument("rooms", nargs="*", metavar="PART", help=f"of {', '.join(ROOMS)} (default: all)")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: all)")
     parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants per part (default 40; 0: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
     parser.add_argument(
@@ -159,16 +159,16 @@ def main() -> int:
         help="write the page also when parts are named; the others keep their rows",
     )
     options = parser.parse_args()
-    unknown = [name for name in options.rooms if name not in ROOMS]
+    unknown = [name for name in options.parts if name not in PARTS]
     if unknown:
-        parser.error(f"no room {', '.join(unknown)}; there are: {', '.join(ROOMS)}")
+        parser.error(f"no part {', '.join(unknown)}; there are: {', '.join(PARTS)}")
     root = repository_root()
-    chosen = {name: ROOMS[name] for name in options.rooms or ROOMS}
+    chosen = {name: PARTS[name] for name in options.parts or PARTS}
     if options.learnt and not options.sample:
         parser.error("--learnt needs a --sample: of all mutants none is left unseen")
     if options.list:
-        for name, room in chosen.items():
-            for file, _, mutant in drawn(room, name, root, options.sample, options.seed):
+        for name, part in chosen.items():
+            for file, _, mutant in drawn(part, name, root, options.sample, options.seed):
                 print(f"{name} {file}:{mutant.line} {mutant.kind}: {mutant.change}")
         return 0
     if not (root / "build" / "host" / "build.ninja").is_file():
@@ -178,36 +178,36 @@ def main() -> int:
     store = Store(place / "results.jsonl")
     samples = {
         name: (
-            unseen(room, name, root, options.sample, options.seed, options.learnt, options.learnt_sample)
+            unseen(part, name, root, options.sample, options.seed, options.learnt, options.learnt_sample)
             if options.learnt
-            else drawn(room, name, root, options.sample, options.seed)
+            else drawn(part, name, root, options.sample, options.seed)
         )
-        for name, room in chosen.items()
+        for name, part in chosen.items()
     }
     learnt = {
-        (name, seed): drawn(room, name, root, options.learnt_sample, seed)
-        for name, room in chosen.items()
+        (name, seed): drawn(part, name, root, options.learnt_sample, seed)
+        for name, part in chosen.items()
         for seed in options.learnt
     }
     if options.kept:
 
         def outcomes(name: str, sample: list[tuple[Path, str, Mutant]]):
-            return kept(store, sample, tests_of(ROOMS[name], root))
+            return kept(store, sample, tests_of(PARTS[name], root))
 
         measured = {name: outcomes(name, sample) for name, sample in samples.items()}
         before = {key: [] if options.fresh_only else outcomes(key[0], each) for key, each in learnt.items()}
     else:
         with tempfile.TemporaryDirectory(dir=place, prefix="work-") as work:
             campaign = Campaign(root, store, options.jobs, Path(work))
-            measured = {name: campaign.go(name, ROOMS[name], sample) for name, sample in samples.items()}
+            measured = {name: campaign.go(name, PARTS[name], sample) for name, sample in samples.items()}
             before = {
-                key: [] if options.fresh_only else campaign.go(key[0], ROOMS[key[0]], each)
+                key: [] if options.fresh_only else campaign.go(key[0], PARTS[key[0]], each)
                 for key, each in learnt.items()
             }
     why = reasons(root)
     page = root / "docs" / "reports" / "mutation.md"
-    to_page = options.page or not options.rooms
-    earlier = page.read_text() if to_page and options.rooms else ""
+    to_page = options.page or not options.parts
+    earlier = page.read_text() if to_page and options.parts else ""
     text, unexplained = write_page(measured, why, options.seed, root, before, earlier)
     if to_page:
         page.write_text(text)

@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 
 from .generate import Mutant
-from .rooms import Stage
+from .parts import Stage
 
 # As the host build, but quickly: no debugging information, no warnings, which are not what is tested.
 DROPPED = ("-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror", "-g1")
@@ -137,10 +137,10 @@ class Worker:
         """Objects of the binary that are linked, and all."""
         prefix = str(Path(stage.binary).name) + ".dir/"
         own = [w for w in self.build.link(stage.binary) if w.endswith(".o") and prefix in w]
-        room = Path(stage.binary).parent.relative_to("tests")
+        part = Path(stage.binary).parent.relative_to("tests")
 
         def name(made: str) -> str:
-            return str(room / made.split(prefix, 1)[1].removesuffix(".o"))
+            return str(part / made.split(prefix, 1)[1].removesuffix(".o"))
 
         return [o for o in own if any(fnmatch(name(o), pattern) for pattern in stage.tests)], own
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .bench import Outcome
 from .generate import Mutant
-from .rooms import Room
+from .parts import Part
 
 OLDER_TESTS = "older tests"  # in the place of the test that killed it
 
@@ -19,10 +19,10 @@ def key_of(file: Path, mutated: str) -> str:
     return hashlib.sha256(f"{file}\n{mutated}".encode()).hexdigest()[:24]
 
 
-def tests_of(room: Room, root: Path) -> str:
-    """The state of a room's tests."""
-    patterns = [pattern for stage in room.stages for pattern in stage.tests]
-    state = hashlib.sha256(repr(room.stages).encode())
+def tests_of(part: Part, root: Path) -> str:
+    """The state of a part's tests."""
+    patterns = [pattern for stage in part.stages for pattern in stage.tests]
+    state = hashlib.sha256(repr(part.stages).encode())
     for path in sorted((root / "tests").rglob("*.[ch]pp")):
         if any(fnmatch(str(path.relative_to(root / "tests")), pattern) for pattern in patterns):
             state.update(path.read_bytes())

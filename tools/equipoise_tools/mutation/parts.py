@@ -27,7 +27,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Room:
+class Part:
     files: tuple[str, ...]
     stages: tuple[Stage, ...]
     target: float = 0.8
@@ -86,8 +86,8 @@ APP_TESTS = {
     },
 }
 
-ROOMS: dict[str, Room] = {
-    "safety": Room(
+PARTS: dict[str, Part] = {
+    "safety": Part(
         (
             "src/actuate/safety.cpp",
             "include/equipoise/actuate/degraded.hpp",
@@ -108,7 +108,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "guard": Room(
+    "guard": Part(
         ("src/app/guard/guard.cpp", "src/app/guard/guard_bridges.cpp"),
         (
             Stage("tests/unit_tests", ("unit/app/guard_loop_test.cpp", "unit/app/guard_bridges_test.cpp")),
@@ -121,7 +121,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "heartbeat": Room(
+    "heartbeat": Part(
         (
             "src/runtime/heartbeat.cpp",
             *(f"include/equipoise/runtime/{n}.hpp" for n in ("heartbeat", "supervisor")),
@@ -136,7 +136,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "command_auth": Room(
+    "command_auth": Part(
         tuple(f"src/runtime/{name}.cpp" for name in COMMANDS),
         (
             Stage(
@@ -147,7 +147,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "drivers": Room(
+    "drivers": Part(
         ("drivers/*.c",),
         (
             Stage(
@@ -167,7 +167,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "log": Room(
+    "log": Part(
         (
             *(f"src/runtime/{name}.cpp" for name in ("log_writer", "log_parts")),
             *(f"src/app/log/{name}.cpp" for name in ("log_reader", "run_log")),
@@ -179,18 +179,18 @@ ROOMS: dict[str, Room] = {
             Stage("tests/app_tests", ("app/run_log_test.cpp", "app/log_reader_test.cpp")),
         ),
     ),
-    "replay": Room(
+    "replay": Part(
         ("src/app/log/replay.cpp",),
         tuple(
             Stage("tests/replay_tests", (f"replay/{test}_test.cpp",))
             for test in ("replay_parts", "replay_result", "fault_replay")
         ),
     ),
-    "bridge": Room(
+    "bridge": Part(
         ("include/equipoise/actuate/bridge.hpp", "src/actuate/drive_coast.cpp"),
         (Stage("tests/unit_tests", ("unit/actuate/drive_coast_test.cpp",)),),
     ),
-    "estimators": Room(
+    "estimators": Part(
         ("include/equipoise/estimate/*.hpp", "include/equipoise/sense/freshness.hpp"),
         (
             *(
@@ -227,7 +227,7 @@ ROOMS: dict[str, Room] = {
             ),
         ),
     ),
-    "control": Room(
+    "control": Part(
         ("include/equipoise/control/*.hpp", "src/control/*.cpp"),
         (
             *(
@@ -247,7 +247,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "robot_control": Room(
+    "robot_control": Part(
         (
             *(f"src/robots/mip/{n}" for n in ("reference.cpp", "lqr_feedback.hpp", "slc_feedback.hpp")),
             *(f"src/robots/mbbr/{n}" for n in ("reference.cpp", "scheduled_feedback.cpp")),
@@ -261,7 +261,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "app": Room(
+    "app": Part(
         tuple(f"src/app/{name}.cpp" for name in APP_TESTS),
         (
             *(
@@ -280,7 +280,7 @@ ROOMS: dict[str, Room] = {
         ),
         target=0.9,
     ),
-    "pipeline": Room(
+    "pipeline": Part(
         ("include/equipoise/pipeline.hpp",),
         (
             Stage("tests/unit_tests", ("unit/pipeline/*_test.cpp",)),
