@@ -227,21 +227,22 @@ def write_page(root: Path, counts: dict) -> None:
 
 
 def draw_stages(root: Path, counts: dict) -> None:
-    from .style import plt  # only this needs Matplotlib
+    from . import style  # only this needs Matplotlib
 
     robots = list(ROBOTS)
-    figure, axes = plt.subplots(figsize=(7, 2.8))
-    stages = [*STAGES, "rest"]
-    left = [0.0] * len(robots)
-    for stage in stages:
-        width = [counts["x86"][r]["stages"][stage] for r in robots]
-        axes.barh(robots, width, left=left, label=stage)
-        left = [a + b for a, b in zip(left, width, strict=True)]
-    axes.set_xlabel("instructions of an armed tick, x86-64")
-    axes.legend(ncols=4, fontsize="small", loc="upper center", bbox_to_anchor=(0.5, 1.3))
-    figure.tight_layout()
-    figure.savefig(root / "docs/images/tick-stages.svg", metadata={"Date": None})
-    plt.close(figure)
+    text = {"svg.fonttype": "none", "svg.hashsalt": "tick-stages"}
+    with style.styled(), style.plt.rc_context(text):
+        figure, axes = style.plt.subplots(figsize=(7, 2.8))
+        left = [0.0] * len(robots)
+        for i, stage in enumerate((*STAGES, "rest")):
+            width = [counts["x86"][r]["stages"][stage] for r in robots]
+            axes.barh(robots, width, left=left, label=stage, color=style.colour(i), zorder=2)
+            left = [a + b for a, b in zip(left, width, strict=True)]
+        axes.set_xlabel("instructions of an armed tick, x86-64")
+        axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.3))
+        figure.tight_layout()
+        figure.savefig(root / "docs/images/tick-stages.svg", metadata={"Date": None})
+        style.plt.close(figure)
 
 
 def performance_page(root: Path) -> str:
