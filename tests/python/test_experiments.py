@@ -4,14 +4,16 @@
 import copy
 import json
 import math
+import shutil
 import subprocess
 import sys
 import tomllib
 
 import numpy as np
 import pytest
-from equipoise_tools import names
+from equipoise_tools import names, style
 from equipoise_tools.calibrate_disturbance import SEARCHED, Search, fragment
+from equipoise_tools.experiments import __main__ as experiments
 from equipoise_tools.experiments import (
     bridge_modes,
     control,
@@ -269,6 +271,19 @@ def test_the_quick_experiments_run(tmp_path):
         module = framework.load(name)
         data.write(name, framework.measured(module, lab), tmp_path)
         assert module.report(data.read(name, tmp_path), tmp_path).findings
+
+
+def test_one_command_writes_each_figure_as_png_and_svg(root, tmp_path, monkeypatch):
+    monkeypatch.setenv(style.SVG_TOO, "")
+    drawn = []
+    for folder, options in ((tmp_path / "png", []), (tmp_path / "a", ["--svg"]), (tmp_path / "b", ["--svg"])):
+        shutil.copytree(root / "docs/experiments/data", folder / "data")
+        command = ["--from-data", *options, "--out", str(folder), "geometry"]
+        assert experiments.main(command) == 0
+        drawn.append({file.name: file.read_bytes() for file in folder.glob("geometry.*g")})
+    assert list(drawn[0]) == ["geometry.png"] and sorted(drawn[1]) == ["geometry.png", "geometry.svg"]
+    assert drawn[1] == drawn[2] and drawn[1]["geometry.png"] == drawn[0]["geometry.png"]
+    assert b"<svg" in drawn[1]["geometry.svg"][:1000]
 
 
 def test_planar_model_has_the_known_spectral_radii():

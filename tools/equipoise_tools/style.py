@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from pathlib import Path
 
 import matplotlib
@@ -17,6 +18,7 @@ ESTIMATE = "#0072B2"
 OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F", "#8B6B3E")
 DASHES = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (6, 2, 1, 2, 1, 2)), (0, (8, 2)))
 DRIVE_PHASE = "#0072B2"
+SVG_TOO = "EQUIPOISE_SVG"  # in the environment
 COLOURS, DPI = 32, 80  # of a tracked picture: the width of a page
 
 RC = {
@@ -56,7 +58,13 @@ def styled():
 
 
 def save(figure: plt.Figure, path: Path) -> None:
-    """PATH.png, the same bytes every time, a quarter of its size by a palette; closes the figure."""
+    """PATH.png, a quarter of its size by a palette, and PATH.svg if asked for; closes the figure.
+
+    The same bytes every time.
+    """
+    if os.environ.get(SVG_TOO):
+        with plt.rc_context({"svg.hashsalt": path.name}):
+            figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=DPI)
     plt.close(figure)

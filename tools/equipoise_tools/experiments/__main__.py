@@ -1,5 +1,4 @@
-"""python -m equipoise_tools.experiments [--list] [--from-data] [--seeds N] [--jobs N] [--out DIR] "
-"[NAME... | all]"""
+"""The dissertation's tables and figures, each as one command."""
 
 from __future__ import annotations
 
@@ -9,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+from .. import style
 from ..entry import leave
 from ..paths import UserError, repository_root
 from . import data, framework
@@ -52,6 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("names", metavar="NAME", nargs="*", help="experiments; all: every one (default)")
     parser.add_argument("--list", action="store_true", help="name them")
     parser.add_argument("--from-data", action="store_true", help="no runs: pages from the data in DIR/data")
+    parser.add_argument("--svg", action="store_true", help="each figure as SVG, too")
     parser.add_argument("--seeds", type=int, default=20, help="runs per condition")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="runs at a time")
     parser.add_argument("--out", type=Path, default=repository_root() / "docs" / "experiments")
@@ -68,6 +69,8 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown:
         print(f"error: no experiment {', '.join(unknown)}; there are: {', '.join(known)}", file=sys.stderr)
         return 2
+    if options.svg:
+        os.environ[style.SVG_TOO] = "1"
     lab = None if options.from_data else Lab(options.seeds, options.jobs)
     return run_all(chosen, options.out, lab)
 
