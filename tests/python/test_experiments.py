@@ -278,12 +278,12 @@ def test_one_command_writes_each_figure_as_png_and_svg(root, tmp_path, monkeypat
     drawn = []
     for folder, options in ((tmp_path / "png", []), (tmp_path / "a", ["--svg"]), (tmp_path / "b", ["--svg"])):
         shutil.copytree(root / "docs/experiments/data", folder / "data")
-        command = ["--from-data", *options, "--out", str(folder), "geometry"]
+        command = ["--from-data", *options, "--out", str(folder), "vibration"]
         assert experiments.main(command) == 0
-        drawn.append({file.name: file.read_bytes() for file in folder.glob("geometry.*g")})
-    assert list(drawn[0]) == ["geometry.png"] and sorted(drawn[1]) == ["geometry.png", "geometry.svg"]
-    assert drawn[1] == drawn[2] and drawn[1]["geometry.png"] == drawn[0]["geometry.png"]
-    assert b"<svg" in drawn[1]["geometry.svg"][:1000]
+        drawn.append({file.name: file.read_bytes() for file in folder.glob("vibration.*g")})
+    assert list(drawn[0]) == ["vibration.png"] and sorted(drawn[1]) == ["vibration.png", "vibration.svg"]
+    assert drawn[1] == drawn[2] and drawn[1]["vibration.png"] == drawn[0]["vibration.png"]
+    assert b"<svg" in drawn[1]["vibration.svg"][:1000]
 
 
 def test_planar_model_has_the_known_spectral_radii():

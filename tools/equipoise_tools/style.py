@@ -62,11 +62,11 @@ def save(figure: plt.Figure, path: Path) -> None:
 
     The same bytes every time.
     """
-    if os.environ.get(SVG_TOO):
-        with plt.rc_context({"svg.hashsalt": path.name}):
-            figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=DPI)
+    if os.environ.get(SVG_TOO):  # after the PNG, whose layout it would move
+        with plt.rc_context({"svg.hashsalt": path.name}):
+            figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
     plt.close(figure)
     flat = (
         Image.open(drawn)
