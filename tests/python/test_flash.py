@@ -120,3 +120,17 @@ def test_bad_usage_is_one_clear_line(root, robot, tmp_path):
         ended = flash(root, robot, *arguments)
         assert ended.returncode == 2 and ended.stderr.count("\n") == 1, arguments
     assert flash(root, robot, "--package", tmp_path / "text.deb", "bone").returncode == 2
+
+
+def test_what_is_missing_is_named_with_its_remedy(root, robot, tmp_path):
+    tools = tmp_path / "clone/tools"  # in which nothing was packaged
+    tools.mkdir(parents=True)
+    (tools / "lib").symlink_to(root / "tools/lib")
+    (tools / "flash").write_bytes((root / "tools/flash").read_bytes())
+    (tools / "flash").chmod(0o755)
+    ended = flash(tools.parent, robot, "bone")
+    assert ended.returncode == 2 and "tools/package --preset bbb" in ended.stderr
+    (tmp_path / "tools/ssh").write_text("#!/bin/sh\nexit 255\n")  # as ssh does when nothing answers
+    for arguments in (["--rollback"], ["--package", package(tmp_path, "good")]):
+        ended = flash(root, robot, *arguments, "bone")
+        assert ended.returncode == 1 and "bone does not answer; try: ssh bone true" in ended.stderr
