@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -156,6 +157,14 @@ def test_shadow_runs_on_our_own_logs_of_both_robots(root, tmp_path):
     assert "robot of type mip, the log of mbbr" in other.stderr
 
 
+def test_a_stretch_too_short_for_the_smoother_is_said_to_be(root, table, tmp_path):
+    short = write_map(tmp_path / "map.toml", root / "config/edumip.toml")
+    short.write_text(short.read_text().replace("from_s = 0.5\nto_s = 30", "from_s = 2.0\nto_s = 2.4"))
+    run("import", table, "--map", short, "-o", tmp_path / "a.lcm")
+    told = run("replay", tmp_path / "a.lcm", "--shadow").stdout
+    assert "against the smoother: no stretch is longer" in told and "nan" not in told
+
+
 def test_errors_name_the_key_and_the_fix(root, table, tmp_path):
     good = write_map(tmp_path / "map.toml", root / "config/edumip.toml")
     bad = tmp_path / "bad.toml"
@@ -163,6 +172,9 @@ def test_errors_name_the_key_and_the_fix(root, table, tmp_path):
     assert 'no column "gyro"' in run("import", table, "--map", bad, "-o", tmp_path / "a.lcm", status=2).stderr
     bad.write_text(good.read_text().replace('unit = "deg/s"', 'unit = "dps"'))
     assert "gyro.unit" in run("import", table, "--map", bad, "-o", tmp_path / "a.lcm", status=2).stderr
+    bad.write_text(re.sub(r"\[gyro\]\n.*\n.*\n", "", good.read_text()))
+    told = run("import", table, "--map", bad, "-o", tmp_path / "a.lcm", status=2).stderr
+    assert f"has no [gyro]; a log without raw gyro: ./tools/lab identify TABLE --map {bad}" in told
     far = pd.read_csv(table)
     far.loc[far.index[-1], "t"] = 3e7
     far.to_csv(tmp_path / "far.csv", index=False)

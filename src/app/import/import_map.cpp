@@ -134,6 +134,10 @@ ImportMap read_robots_map(const std::string& path, bool imu) {
       s.finish();
     }
   }
+  if (imu && !root.has("gyro")) {
+    throw ConfigError(path + ": has no [gyro]; a log without raw gyro: ./tools/lab identify TABLE --map " +
+                      path);
+  }
   if (imu || root.has("gyro")) map.gyro = read_imu(root.table("gyro"), kRate);
   if (imu || root.has("accel")) map.accel = read_imu(root.table("accel"), kAcceleration);
   if (!imu || root.has("tilt")) read_tilt(root.table("tilt"), &map);

@@ -75,8 +75,14 @@ void Shadow::print(std::FILE* out) const {
   std::fprintf(out, "  NIS per row:");
   for (const auto& [row, square] : nis)
     std::fprintf(out, "  %s %.2f", row.c_str(), square.sum / square.count);
-  std::fprintf(out, "\n  tilt against the smoother %.2f mrad (constant offset of %.1f apart)\n",
-               1e3 * tilt_std_rad(*this), 1e3 * mean_of(tilt_error_rad[0]));
+  std::fputc('\n', out);
+  if (const double tilt_rad = tilt_std_rad(*this); std::isfinite(tilt_rad)) {
+    std::fprintf(out, "  tilt against the smoother %.2f mrad (constant offset of %.1f apart)\n",
+                 1e3 * tilt_rad, 1e3 * mean_of(tilt_error_rad[0]));
+  } else {
+    std::fprintf(
+        out, "  tilt against the smoother: no stretch is longer than it takes to settle, half a second\n");
+  }
   for (const auto& each : ahead) {
     const std::string& time = each.first;
     const Ahead& a = each.second;
