@@ -36,5 +36,5 @@ def need(module: str, extra: str) -> Any:
         if error.name != module:
             raise
         raise ModuleNotFoundError(
-            f"{module} is not installed; pip install 'equipoise-robot[{extra}]'", name=module
+            f"{module} is not installed; in a clone: pip install '.[{extra}]'", name=module
         ) from None

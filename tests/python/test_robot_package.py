@@ -189,7 +189,7 @@ import equipoise_robot
 equipoise_robot.sweep("mip", {"seed": [1]})
 """
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert "pandas is not installed; pip install 'equipoise-robot[pandas]'" in ran.stderr
+    assert "pandas is not installed; in a clone: pip install '.[pandas]'" in ran.stderr
 
 
 @pytest.mark.parametrize("name", ["Mbbr", "Mip"])

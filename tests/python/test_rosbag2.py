@@ -208,4 +208,4 @@ sys.exit(main([{str(log)!r}, "--out", {str(bag) + "2"!r}]))
 """
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert ran.returncode == 2
-    assert "rosbags is not installed; pip install 'equipoise-robot[ros]'" in ran.stderr
+    assert "rosbags is not installed; in a clone: pip install '.[ros]'" in ran.stderr

@@ -16,7 +16,9 @@ EventDevice::EventDevice(RemoteFile file) : file_(std::move(file)), controls_(fi
     throw InputError(file_.device +
                      ": does not say how far its axes go; add axis_range = [LOW, HIGH] to [events]");
   if (status == -EINVAL) throw InputError(file_.device + ": has not the axes that [events] names");
-  if (status < 0) throw std::runtime_error(file_.device + ": " + std::strerror(-status));
+  if (status < 0)
+    throw std::runtime_error(file_.device + ": " + std::strerror(-status) +
+                             "; [remote] device: one of /dev/input/by-id, which the group input may read");
 }
 
 EventDevice::~EventDevice() { close(); }

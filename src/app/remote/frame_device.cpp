@@ -60,7 +60,9 @@ Hand ButtonPad::hand(double now_s) {
 FrameDevice::FrameDevice(RemoteFile file)
     : file_(std::move(file)), matcher_(file_.frames), pad_(file_.hold_s) {
   const int status = serial_open(&serial_, file_.device.c_str(), static_cast<std::uint32_t>(file_.baud));
-  if (status < 0) throw std::runtime_error("serial: " + file_.device + ": " + std::strerror(-status));
+  if (status < 0)
+    throw std::runtime_error("serial: " + file_.device + ": " + std::strerror(-status) +
+                             "; [remote] device: the port's path (/dev/rfcomm0), or its address on a board");
 }
 
 FrameDevice::~FrameDevice() { serial_close(&serial_); }

@@ -32,7 +32,9 @@ struct Port : NoCopy {
   explicit Port(const LearnArguments& a) {
     const int status = serial_open(&serial, a.port.c_str(), static_cast<std::uint32_t>(a.baud));
     if (status == -EINVAL) throw InputError("serial: " + std::to_string(a.baud) + " baud: 1200 to 115200");
-    if (status < 0) throw std::runtime_error("serial: " + a.port + ": " + std::strerror(-status));
+    if (status < 0)
+      throw std::runtime_error("serial: " + a.port + ": " + std::strerror(-status) +
+                               "; pair the device and name its port, as after rfcomm bind 0 ADDRESS");
   }
   ~Port() { serial_close(&serial); }
 

@@ -18,7 +18,9 @@ class SerialStream final : public runtime::ByteStream {
   SerialStream(const std::string& device, std::uint32_t baud) : baud_(baud) {
     const int status = serial_open(&serial_, device.c_str(), baud);
     if (status == -EINVAL) throw InputError("serial: " + std::to_string(baud) + " baud: 1200 to 115200");
-    if (status < 0) throw std::runtime_error("serial: " + device + ": " + std::strerror(-status));
+    if (status < 0)
+      throw std::runtime_error("serial: " + device + ": " + std::strerror(-status) +
+                               "; serial:DEVICE:BAUD takes the port's path (/dev/rfcomm0)");
   }
   ~SerialStream() override { serial_close(&serial_); }
   std::size_t read(std::uint8_t* out, std::size_t size) override {
