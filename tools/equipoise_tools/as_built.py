@@ -47,6 +47,10 @@ STEPS = (
     ("corrected EKF, scheduled gains", "ekf13", "scheduled"),
     ("default EKF (delay, mount, scale), scheduled gains", "ekf", "scheduled"),
 )
+THESIS = (
+    "Published gains: [T]'s, with our sign of (6.13), body rates, inertial filters and acceleration limit; "
+    "without these: [control](../experiments/control.md)."
+)
 LIMITS = {"attitude_rmse_rad": 0.010, "yaw_frame_speed_rmse_m_s": 0.015}  # 95 % of the robots, up to 1.5 Hz
 
 
@@ -160,7 +164,8 @@ def campaign_part(rows: list[dict], settings: dict, made: str) -> str:
 def steps_part(found: list[tuple[str, list[dict]]], first: int) -> str:
     where = f"{POINT[0]:g} Hz and {POINT[1]:g} m/s, {DURATION_S:.0f} s, world `{WORLD}`"
     where += ", at {}, {}".format(*commit_and_date())
-    robots = f"The same {len(found[0][1])} robots ({first} to {first + len(found[0][1]) - 1}), {where}.\n\n"
+    robots = f"The same {len(found[0][1])} robots ({first} to {first + len(found[0][1]) - 1}), {where}.\n"
+    robots += f"{THESIS}\n\n"
     picture = "\n\n![Robots still upright over time, step by step](as_built_steps.png)\n"
     return STEPS_HEAD + robots + "\n".join(steps_table(found)) + picture
 
