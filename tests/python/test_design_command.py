@@ -105,6 +105,29 @@ def test_margins_tell_a_bad_weight_a_bad_filter_and_a_late_chain(root, setting, 
     assert any(missed in s for s in shortfalls(design(root, "mbbr", f"--set={setting}")))
 
 
+def test_the_page_says_what_a_gain_on_the_balls_rate_costs(root):
+    page = (root / "docs/derivation.md").read_text(encoding="utf-8")
+    told = re.search(
+        r"weights theta ([\d.]+), phi ([\d.]+), body rate ([\d.]+), phi\*' ([\d.]+) have (.*?)\.\s",
+        page,
+        re.S,
+    )
+    names = ("theta_rad", "phi_rad", "body_rate_rad_s", "phi_dot_rad_s")
+    weights = [
+        f"--set=controller.scheduled.design.{n}={v}" for n, v in zip(names, told.groups(), strict=False)
+    ]
+    rows = design(root, "mbbr", *weights, "--last-hz", "3", "--step-hz", "0.5")["rows"]
+
+    def least(place, *names):
+        return min(abs(row["margins"][place][name]) for row in rows for name in names)
+
+    gain = ("gain_up_dB", "gain_down_dB")
+    found = [least("gyro", "phase_deg"), least("gyro", *gain), least("encoder", "phase_deg")]
+    found += [least("encoder", *gain), least("u", "phase_deg")]
+    quoted = [float(number) for number in re.findall(r"\d+(?:\.\d+)?", told[5])]
+    assert [round(f, 0 if f > 10 else 1) for f in found] == quoted
+
+
 def test_gains_poles_and_margins_are_printed(root):
     command = [
         root / "build/host/equipoise",

@@ -1,5 +1,7 @@
 """The MIP's controllers: the published one's poles, our margins, and the exact robot holding."""
 
+import re
+
 import numpy as np
 import pytest
 from derive import mip
@@ -32,6 +34,24 @@ def test_margins_with_one_tick_lost(controller, yaw_rate, lateral):
     assert margins.gain_down_dB <= -gain_dB
     assert margins.phase_deg >= phase_deg
     assert margins.delay_ticks > ticks
+
+
+def test_the_page_has_these_margins(root):
+    page = (root / "docs/derivation.md").read_text(encoding="utf-8")
+    for controller in ("published", "slc", "lqr"):
+        row = re.search(rf"^\| `?{controller}\b[^|]*\| 0 / 10 \|(.*)\|$", page, re.M)[1]
+        cells = [
+            re.findall(r"\d+(?:\.\d+)?", re.sub(r"ticks of \d+ ms", "", cell)) for cell in row.split("|")
+        ]
+        at = [mip_gains.margins(controller, yaw_rate, late_ticks=1) for yaw_rate in (0.0, 10.0)]
+        names = (("pole",), ("gain_down_dB", "gain_up_dB"), ("phase_deg",), ("delay_ticks",))
+        for quoted, of in zip(cells, names, strict=True):
+            known = [abs(getattr(m, name)) for name in of for m in at]
+            for number in quoted:
+                half = 0.501 * 10.0 ** -len(number.partition(".")[2])
+                assert min(abs(float(number) - k) for k in known) <= half, (controller, number)
+    unstable = [np.linalg.eigvals(mip_gains.planar_system(y)[0]).real.max() for y in (0.0, 10.0)]
+    assert "from {:.1f} to {:.1f} rad/s at 10 rad/s".format(*unstable) in page
 
 
 def test_redesign_is_better_than_the_published_one_at_every_yaw_rate():
