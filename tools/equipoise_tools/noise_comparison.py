@@ -96,6 +96,14 @@ def high_passed(samples: np.ndarray) -> np.ndarray:
     return out
 
 
+def shape(samples: np.ndarray) -> dict[str, list[float]]:
+    """Of each axis, above 20 Hz."""
+    x = high_passed(samples)
+    sigma = x.std(axis=0)
+    lag_1 = (x[1:] * x[:-1]).mean(axis=0) / sigma**2
+    return {"sigma": sigma.tolist(), "lag_1": lag_1.tolist(), "excess_kurtosis": kurtosis(x).tolist()}
+
+
 def features(samples: np.ndarray) -> np.ndarray:
     """Of each window of a second, half overlapping: logarithm of sigma, lag-1 correlation, tails."""
     noise = high_passed(samples)

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from .entry import leave
-from .paths import commit_and_date, repository_root
+from .noise_comparison import MOTIONS, real_motions, shape
+from .paths import binary, commit_and_date, repository_root
 from .table import matlab
 
 MAPS = Path("config/real/maps")
@@ -24,6 +25,18 @@ what they are: [reality.md](../reality.md).
 
 ## Shadow
 """
+
+
+def vibration_rows(found: dict[str, Any]) -> list[str]:
+    rows = ["| log | gyro x y z, rad/s | accelerometer x y z, m/s2 | lag-1 | excess kurtosis |"]
+    rows += ["|---|---|---|---|---|"]
+    for log, motions_of in found.items():
+        for motion, s in motions_of.items():
+            sigma, (lag, tails) = s["sigma"], (s["lag_1"], s["excess_kurtosis"])
+            cells = [" ".join(f"{v:.3f}" for v in sigma[:3]), " ".join(f"{v:.2f}" for v in sigma[3:])]
+            cells += [f"{min(lag):.2f} to {max(lag):.2f}", f"{min(tails):.1f} to {max(tails):.1f}"]
+            rows.append(f"| {log}, {motion} | {' | '.join(cells)} |")
+    return rows
 
 
 def maps_of(root: Path) -> dict[str, dict[str, Any]]:
@@ -187,6 +200,9 @@ def page_of(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
             *ahead_rows,
             "\nNoise of the samples while balancing (second differences, as white noise).\n",
             *noise_rows,
+            "\n## Vibration\n",
+            "Above 20 Hz at 200 Hz, standard deviation; rolling: on casters.\n",
+            *vibration_rows(data.get("vibration", {})),
             "\n## Identified\n",
             "`tools/lab identify`, SI, first half fitted; 0.1 s ahead in the rest: tilt, wheels, mrad.\n",
             *known_rows,
@@ -215,6 +231,10 @@ def main() -> int:
             print(f"{file.stem}: not in {arguments.folder}", file=sys.stderr)
             continue
         print(f"{file.stem} ...", file=sys.stderr)
+        if file.stem in MOTIONS:
+            _, motions_of = real_motions(binary(), table, file)
+            shapes = {motion: shape(samples) for motion, samples in motions_of.items()}
+            data.setdefault("vibration", {})[file.stem] = shapes
         if "gyro" in maps[file.stem]:
             done[file.stem] = measured(root, table, file)
         else:
