@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from equipoise_tools.estimator_comparison import __main__ as comparison
 from equipoise_tools.estimator_comparison import drawn, judge, page
 from equipoise_tools.estimator_comparison.filters import (
     ErrorState,
@@ -17,6 +18,7 @@ from equipoise_tools.estimator_comparison.filters import (
 )
 from equipoise_tools.estimator_comparison.model import GROUPS, SCALE, Model, N, robot_of
 from equipoise_tools.estimator_comparison.recorded import record, run_filter, samples_of
+from equipoise_tools.paths import UserError
 from scipy.stats import chi2
 
 THREE = (Extended, Unscented, ErrorState)
@@ -180,3 +182,8 @@ def test_new_tables_bring_their_commit_and_date(tmp_path):
     assert "Measured at 1234567, 2026-01-02." in path.read_text() and "old" not in path.read_text()
     page.insert(path, "new", "89abcde-dirty, 2026-03-04")
     assert path.read_text() == f"# T\nMeasured at 89abcde-dirty, 2026-03-04.\n{page.BEGIN}\nnew\n{page.END}\n"
+
+
+def test_data_that_are_not_there_are_named(tmp_path):
+    with pytest.raises(UserError, match=r"estimators\.parquet: cannot be read; run without --from-data"):
+        comparison.main(["--from-data", "--out", str(tmp_path)])

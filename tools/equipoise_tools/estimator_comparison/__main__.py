@@ -43,7 +43,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         rows = measure.read(table)
     except OSError as error:
-        raise UserError(f"{table}: {error.strerror}; run without --from-data") from None
+        reason = error.strerror or "cannot be read"  # pyarrow's has none
+        raise UserError(f"{table}: {reason}; run without --from-data") from None
     page.draw(rows, options.out)
     text = page.tables(rows)
     print(text)
