@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="tools/requirements-optional.txt")
 from equipoise_tools.benchmark import __main__ as benchmark
-from equipoise_tools.benchmark import peers, policy, runs, score, sensing, tuning
+from equipoise_tools.benchmark import peers, picture, policy, runs, score, sensing, tuning
 
 NO_TINYMPC = pytest.mark.skipif(not peers.available("mpc"), reason="tools/requirements-tinympc.txt")
 OTHERS = [
@@ -252,6 +252,9 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path):
     assert refused == 2
 
 
-def test_the_page_is_that_of_the_kept_scores():
+def test_the_page_is_that_of_the_kept_scores(tmp_path):
     kept = json.loads(benchmark.KEPT.read_text())
     assert benchmark.PAGE.read_text() == score.page(kept["scores"], kept["about"])
+    picture.draw(kept["scores"], tmp_path / benchmark.PAGE.name)
+    drawn = benchmark.PAGE.with_suffix(".png")
+    assert (tmp_path / drawn.name).read_bytes() == drawn.read_bytes()

@@ -166,13 +166,17 @@ def test_sigma_points_have_the_mean_and_covariance_they_stand_for(config):
     np.testing.assert_allclose(P, filter_.P, rtol=1e-9, atol=1e-9)
 
 
-def test_the_page_shows_what_the_data_say(root):
-    """The tables of the page are those of its data."""
+def test_the_page_shows_what_the_data_say(root, tmp_path):
+    """Its tables and its picture are those of its data."""
     from equipoise_tools.estimator_comparison import measure
 
-    text = (root / "docs/reports/estimators.md").read_text()
+    reports = root / "docs/reports"
+    text = (reports / "estimators.md").read_text()
     shown = text.split(page.BEGIN, 1)[1].split(page.END, 1)[0].strip()
-    assert shown == page.tables(measure.read(root / "docs/reports/estimators.parquet")).strip()
+    rows = measure.read(reports / "estimators.parquet")
+    assert shown == page.tables(rows).strip()
+    page.draw(rows, tmp_path)
+    assert (tmp_path / "estimators.png").read_bytes() == (reports / "estimators.png").read_bytes()
 
 
 def test_new_tables_bring_their_commit_and_date(tmp_path):
