@@ -265,6 +265,11 @@ def test_unknown_names_are_refused():
     assert "no experiment tabel; there are: " in done.stderr
 
 
+def test_data_that_are_not_there_are_named(tmp_path, capsys):
+    assert experiments.main(["--from-data", "--out", str(tmp_path), "geometry"]) == 1
+    assert "geometry.parquet: no such data; run without --from-data" in capsys.readouterr().out
+
+
 def test_the_quick_experiments_run(tmp_path):
     lab = runs.Lab(seeds=2)
     for name in ("geometry", "motor_selection", "friction_identification", "published_gains"):

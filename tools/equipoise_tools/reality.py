@@ -224,12 +224,14 @@ def main() -> int:
     data_file = root / DATA
     data = json.loads(data_file.read_text()) if data_file.exists() else {"now": {}}
     maps = maps_of(root)
-    done = {}
+    done, missing, ran = {}, [], 0
     for file in sorted((root / MAPS).glob("*.toml")):
         table = found(arguments.folder.resolve(), maps[file.stem]["source"])
         if table is None:
             print(f"{file.stem}: not in {arguments.folder}", file=sys.stderr)
+            missing.append(file.stem)
             continue
+        ran += 1
         print(f"{file.stem} ...", file=sys.stderr)
         if file.stem in MOTIONS:
             _, motions_of = real_motions(binary(), table, file)
@@ -242,12 +244,19 @@ def main() -> int:
             data.setdefault("identified", {})[file.stem] = known | {"log": table.name}
     for file in sorted((root / MAPS).parent.glob("motors/*.toml")):
         found_motors = motors(root, arguments.folder.resolve(), file)
-        if found_motors is not None:
+        if found_motors is None:
+            missing.append(file.stem)
+        else:
+            ran += 1
             data.setdefault("motors", {})[file.stem] = found_motors
-    if not done and not data.get("identified"):
+    if ran == 0:
         print(f"{arguments.folder}: holds none of the logs of docs/reports/reality.md", file=sys.stderr)
         return 1
-    data["version"], data["date"] = commit_and_date()
+    commit, today = commit_and_date()
+    if missing:  # their numbers are from before
+        data["date"] += f"; at {commit}, {today} all but {', '.join(missing)}"
+    else:
+        data["version"], data["date"] = commit, today
     data["now"] |= done
     for shadow in done.values():
         for key in ("log", "config", "version"):

@@ -11,6 +11,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from ..paths import UserError
+
 TEXTS = ("case", "filter", "control", "world", "gains", "fitted", "quantity")
 TRACE_HZ = 20.0
 TRACE_NUMBER = pa.decimal128(18, 5)  # what a figure shows; a third smaller than floating point
@@ -137,6 +139,8 @@ def write(name: str, data: Data, out_dir: Path) -> None:
 
 def read(name: str, out_dir: Path) -> Data:
     numbers, traces = files(name, out_dir)
+    if not numbers.exists():
+        raise UserError(f"{numbers}: no such data; run without --from-data")
     data = Data(rows=pq.read_table(numbers).to_pylist())
     if traces.exists():
         for row in pq.read_table(traces).to_pylist():
