@@ -4,6 +4,7 @@
 import copy
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -199,8 +200,10 @@ def test_committed_findings_follow_from_the_committed_data(name, root):
 @pytest.mark.parametrize("name", framework.names())
 def test_committed_pages_come_from_the_committed_data(name, root, tmp_path):
     committed = root / "docs" / "experiments"
-    made = framework.load(name).report(data.read(name, committed), tmp_path)
-    framework.write(name, made, tmp_path)
+    kept = data.read(name, committed)
+    made = framework.load(name).report(kept, tmp_path)
+    assert re.fullmatch(r"[0-9a-f]{7,}, 20\d\d-\d\d-\d\d", kept.at), "commit and date"
+    framework.write(name, made, tmp_path, kept.at)
     for suffix in ("md", "json"):
         file = f"{name}.{suffix}"
         assert (tmp_path / file).read_bytes() == (committed / file).read_bytes(), file

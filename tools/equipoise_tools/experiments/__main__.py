@@ -20,8 +20,9 @@ def run_one(name: str, out_dir: Path, lab: Lab | None) -> list[str]:
     module = framework.load(name)
     if lab is not None:
         data.write(name, framework.measured(module, lab), out_dir)
-    result = module.report(data.read(name, out_dir), out_dir)
-    framework.write(name, result, out_dir)
+    made = data.read(name, out_dir)
+    result = module.report(made, out_dir)
+    framework.write(name, result, out_dir, made.at)
     return [f"{f.target}: {f.text} ({f.ran})" for f in result.findings if not f.holds]
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..paths import UserError
+from ..paths import UserError, commit_and_date
 
 TEXTS = ("case", "filter", "control", "world", "gains", "fitted", "quantity")
 TRACE_HZ = 20.0
@@ -47,6 +47,7 @@ class Data:
 
     rows: list[dict] = field(default_factory=list)
     traces: dict[tuple[str, str], np.ndarray] = field(default_factory=dict)  # (case, series), at TRACE_HZ
+    at: str = ""  # commit and date of the measurement; empty: now
     _values: dict | None = None
 
     def add(
@@ -115,9 +116,9 @@ def write(name: str, data: Data, out_dir: Path) -> None:
     columns["value"] = pa.array([row["value"] for row in rows], pa.float64())
     options = {"compression": "zstd", "compression_level": 19}
     named = [*TEXTS, "seed", "duration_s"]
-    pq.write_table(
-        pa.table(columns), numbers, use_byte_stream_split=["value"], use_dictionary=named, **options
-    )
+    at = {"at": data.at or ", ".join(commit_and_date())}
+    table = pa.table(columns).replace_schema_metadata(at)
+    pq.write_table(table, numbers, use_byte_stream_split=["value"], use_dictionary=named, **options)
     traces.unlink(missing_ok=True)
     if data.traces:
         keys = sorted(data.traces)
@@ -141,7 +142,8 @@ def read(name: str, out_dir: Path) -> Data:
     numbers, traces = files(name, out_dir)
     if not numbers.exists():
         raise UserError(f"{numbers}: no such data; run without --from-data")
-    data = Data(rows=pq.read_table(numbers).to_pylist())
+    table = pq.read_table(numbers)
+    data = Data(rows=table.to_pylist(), at=(table.schema.metadata or {}).get(b"at", b"").decode())
     if traces.exists():
         for row in pq.read_table(traces).to_pylist():
             data.traces[row["case"], row["series"]] = np.array(row["values"], dtype=float)

@@ -248,8 +248,10 @@ def complaints(record: dict, data: Data) -> list[str]:
     return wrong
 
 
-def page(name: str, result: Result) -> str:
+def page(name: str, result: Result, at: str = "") -> str:
+    """`at`: commit and date of the data."""
     lines = [f"# {result.title}", "", result.method, "", "```", result.command, "```", ""]
+    lines += [f"Data of {at}.", ""] if at else []
     lines += [f"![{picture}]({picture}.png)\n" for picture in result.pictures]
     values = [v for v in result.values if v.runs]
     setups = dict.fromkeys(str(row.ran) for row in [*result.findings, *values])
@@ -292,10 +294,10 @@ def record_of(result: Result) -> dict:
     }
 
 
-def write(name: str, result: Result, out_dir: Path) -> None:
+def write(name: str, result: Result, out_dir: Path, at: str = "") -> None:
     """NAME.md, and NAME.json for the summary."""
     out_dir.mkdir(parents=True, exist_ok=True)
-    (out_dir / f"{name}.md").write_text(page(name, result))
+    (out_dir / f"{name}.md").write_text(page(name, result, at))
     record = record_of(result)
     findings = ",\n".join(
         json.dumps(f, ensure_ascii=False, separators=(",", ":")) for f in record.pop("findings")
