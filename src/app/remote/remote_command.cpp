@@ -191,7 +191,7 @@ int lines(const std::string& path) {
 
 void add_remote(Subcommand app) {
   const Subcommand remote =
-      app.subcommand("remote", "A remote in the hand: gamepad, keyboard, or an app through an HC-06")
+      app.subcommand("remote", "Hand-held remotes: gamepad, keyboard, or an app through an HC-06")
           .example("equipoise remote learn --port /dev/rfcomm0 --out remote.toml");
   remote.require_subcommand();
 
@@ -209,8 +209,8 @@ void add_remote(Subcommand app) {
   const Subcommand say =
       remote
           .subcommand("lines",
-                      "What the hand does, as the lines that send --live takes: for a remote at another "
-                      "machine than the robot")
+                      "Prints what a remote asks for as lines for send --live: for a remote that is not "
+                      "plugged into the robot")
           .example("equipoise remote lines config/remotes/gamepad.toml");
   say.option("file", *path, "the remote, TOML; see config/remotes").file().required();
   say.action([=] { return lines(*path); });

@@ -158,7 +158,7 @@ void add_run(Subcommand app) {
       .show_default()
       .range(0.0, 1e12);
   command.option("--seed", a->seed, "sim: of every random number").show_default();
-  command.option("--duration-s", a->duration_s, "stop after this long, s; 0: when told to")
+  command.option("--duration-s", a->duration_s, "stop after this long, s; 0: until stopped")
       .show_default()
       .range(0.0, 360000.0);
   const Option yaw = command.option("--yaw-hz", a->yaw_hz, "yaw rate, turns per second").range(-5.0, 5.0);
@@ -186,7 +186,7 @@ void add_run(Subcommand app) {
               std::string("where to listen with --command-key: ") + kWireHelp +
                   "; on a board also serial or can, as its file says")
       .show_default();
-  command.option("--estimator", a->choice.estimator, "who controls (default: the robot's)");
+  command.option("--estimator", a->choice.estimator, "which estimator controls (default: the robot's)");
   command.option("--controller", a->choice.controller, "state feedback (default: the robot's)");
   command.flag("--compare", a->choice.compare, "run every estimator on the same samples");
   command.option("--set", a->set, "override a configuration key, e.g. --set friction.compensation=0.8");
