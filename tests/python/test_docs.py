@@ -330,6 +330,16 @@ def test_an_old_word_is_found(tmp_path):
     assert [(f.line, "faulty" in str(f)) for f in found] == [(2, True)]
 
 
+def test_reports_say_their_commit_and_date(root):
+    measured = [file for file in (root / "docs/reports").glob("*.md") if file.name != "parts.md"]  # no runs
+    for file in [*measured, *(root / "docs/experiments").glob("[a-z]*.md")]:
+        text = file.read_text(encoding="utf-8")
+        parts = re.split(r"^(?=## )", text, flags=re.M)[1:] if file.stem == "as-built" else [text]
+        for part in parts:
+            head = "\n".join(part.splitlines()[:14])
+            assert re.search(r"\b[0-9a-f]{7,}(-dirty)?, 20\d\d-\d\d-\d\d", head), (file.name, head[:200])
+
+
 def test_hand_written_pages_are_at_most_thirty_thousand_words(root):
     names = [name for name in pages(tree_of_git(root)) if name != "docs/performance.md"]  # generated
     assert sum(len((root / name).read_text(encoding="utf-8").split()) for name in names) <= 30000
