@@ -3,6 +3,7 @@
 import argparse
 import json
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -236,3 +237,23 @@ def test_campaigns_run_again_take_their_place_on_the_page_and_leave_the_others()
     text = as_built.renewed(page, ["## B\nnew\n", "## C\nnew\n", as_built.STEPS_HEAD + "new\n"])
     steps = "## Filter and controller, step by step\nnew\n"
     assert text == as_built.HEAD + "## A\n1\n### of A\n## B\nnew\n## C\nnew\n" + steps
+
+
+def test_an_unknown_world_is_refused_with_the_known_ones(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        campaign.main(["--fidelity", "nosuch"])
+    assert "invalid choice: 'nosuch'" in capsys.readouterr().err
+
+
+def test_what_the_user_can_mend_is_one_line(tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "equipoise_tools.animate",
+        tmp_path / "no.lcm",
+        "--out",
+        tmp_path / "a.gif",
+    ]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 2
+    assert ended.stderr == f"error: {tmp_path}/no.lcm: No such file or directory\n"

@@ -27,6 +27,7 @@ def identity(trial: dict) -> tuple:
 
 
 SEEDS_APART = 1_000_000
+WORLDS = ("ideal", "thesis", "nominal", "full", "built2025")
 
 
 def plan(robots: range, seeds: int, runs: list[tuple[float, float]], settings: dict) -> list[dict]:
@@ -181,7 +182,7 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
         default="calm",
         help="of mujoco: level and untouched, or sloped, with sills of 1 to 2 mm and pushes of 1 to 4 N",
     )
-    parser.add_argument("--fidelity", default="full")
+    parser.add_argument("--fidelity", default="full", choices=WORLDS)
     parser.add_argument("--estimator", default="")
     parser.add_argument("--controller", default="")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")

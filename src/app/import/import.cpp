@@ -80,7 +80,8 @@ std::vector<double> row_times(const Table& table, const ImportMap& map, std::siz
 /// Rows in the time that the map asks for, each after the one before.
 std::vector<std::size_t> advancing_rows(const Table& table, const ImportMap& map, std::size_t count,
                                         ImportedRows* rows) {
-  if (count == 0) throw InputError("the table has no row of numbers");
+  if (count == 0)
+    throw InputError("the table has no row of numbers; [table] of the map says how the file is made");
   std::vector<std::size_t> used;
   const std::vector<double> times = row_times(table, map, count);
   for (std::size_t k = 0; k < times.size(); ++k) {

@@ -7,7 +7,6 @@ python -m equipoise_tools.estimator_comparison --from-data  from docs/reports/es
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
@@ -54,7 +53,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    try:
-        leave(main)
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    leave(main)
