@@ -3,8 +3,8 @@
 // that it is symmetric by form; its rows start at even columns, so that pairs are aligned. Angles that grow
 // are kept within a few radians, so that single precision resolves them; what is whole in them stands beside.
 // An angle that no sample shows is forgotten before its variance takes the digits of the others'. Filters
-// that are copies share their constants; one can adopt the state of another for the price of a copy. In:
-// input, measurements with a mask of those to use -> state, variances, innovations and their variances.
+// that are copies share their constants; one can adopt the state of another for the price of a copy.
+// In: input, measurements with a mask of those to use -> state, variances, innovations and their variances.
 // Source: tools/derive/packed.py; docs/filter.md. RT-safe: fixed size, bounded.
 #pragma once
 
@@ -332,22 +332,15 @@ class PackedFilter {
     for (int i = 0; i < kAngles; ++i) {
       const auto row = static_cast<std::size_t>(Model::kWheel) + static_cast<std::size_t>(i);
       if (core.weight[row] != Real{0} || !(row_variance_[row] > 1.0)) continue;
-      const Turnings w = turning_rows_.row(Model::kWheel + i);
-      const Turnings d = of_wheel_.col(i);
-      Vec<n> Pw;
+      Vec<n> w = Vec<n>::Zero(), d = Vec<n>::Zero();
+      w.template segment<kAngles>(Model::kTurning) = turning_rows_.row(Model::kWheel + i);
+      d.template segment<kAngles>(Model::kTurning) = of_wheel_.col(i);
+      const Vec<n> Pw = P() * w;
+      const double anew = w.dot(Pw) + initial_variance_(Model::kTurning) * w.squaredNorm();
       for (int j = 0; j < n; ++j) {
-        Pw(j) = 0.0;
-        for (int k = 0; k < kAngles; ++k) Pw(j) += P_at(j, Model::kTurning + k) * w(k);
-      }
-      const double anew = w.dot(Pw.template segment<kAngles>(Model::kTurning)) +
-                          initial_variance_(Model::kTurning) * w.squaredNorm();
-      for (int k = 0; k < kAngles; ++k) {
-        for (int j = 0; j < n; ++j) {
-          const int l = j - Model::kTurning;
-          const bool angle = l >= 0 && l < kAngles;
-          if (angle && l < k) continue;  // the same entry
-          const double of_both = angle ? d(l) * (Pw(Model::kTurning + k) - d(k) * anew) : 0.0;
-          core.P[place(Model::kTurning + k, j)] -= static_cast<Real>(d(k) * Pw(j) + of_both);
+        for (int k = j; k < n; ++k) {
+          if (d(j) != 0.0 || d(k) != 0.0)
+            core.P[place(j, k)] -= static_cast<Real>(d(j) * Pw(k) + Pw(j) * d(k) - d(j) * d(k) * anew);
         }
       }
     }
