@@ -5,20 +5,14 @@
 #include <iio_imu.h>
 #include <monotonic.h>
 #include <sys/stat.h>
+#include <sysfs.h>
 #include <unistd.h>
 
-#include <fstream>
 #include <string>
 
 namespace {
 const std::string kDevices = "/sys/bus/iio/devices/";
 constexpr int kItsAcceleration = 344;
-
-void write_file(const std::string& path, const char* text) {
-  std::ofstream file(path);
-  file << text << std::flush;
-  ASSERT_TRUE(file.good()) << path;
-}
 
 /// One that is called so, for as long as it lives.
 class KernelDummy : public ::testing::Test {
@@ -28,13 +22,14 @@ class KernelDummy : public ::testing::Test {
     ASSERT_EQ(mkdir(directory_.c_str(), 0755), 0) << directory_ << ": " << strerror(errno);
   }
   ~KernelDummy() override { rmdir(directory_.c_str()); }
-  void pull() { write_file(trigger_ + "trigger_now", "1"); }
+  void pull() { ASSERT_EQ(sysfs_write_text(trigger_.c_str(), "trigger_now", "1"), 0); }
   void SetUp() override {
     char trigger[SYSFS_PATH_MAX];
-    if (sysfs_find(kDevices.c_str(), "trigger", "sysfstrig7", trigger) != 0)
-      write_file(kDevices + "iio_sysfs_trigger/add_trigger", "7");
+    if (sysfs_find(kDevices.c_str(), "trigger", "sysfstrig7", trigger) != 0) {
+      ASSERT_EQ(sysfs_write_text((kDevices + "iio_sysfs_trigger").c_str(), "add_trigger", "7"), 0);
+    }
     ASSERT_EQ(sysfs_find(kDevices.c_str(), "trigger", "sysfstrig7", trigger), 0);
-    trigger_ = std::string(trigger) + "/";
+    trigger_ = trigger;
   }
 
   iio_fault_t fault_{};
