@@ -202,6 +202,24 @@ TEST(ManualDrive, WithoutValidSamplesGivesUpWithMotorsOff) {
   EXPECT_FALSE(mock.written.back().enable);
 }
 
+// What turned no motor must not be measured.
+TEST(ManualDrive, ATickThatTheGuardFoundTooLateEndsTheJob) {
+  rio_sensors_t sample{};
+  sample.valid = RIO_IMU | RIO_ENCODERS;
+  Mock mock(std::vector<rio_sensors_t>(20, sample));
+  runtime::HeartbeatPage page{};
+  ManualDrive manual(
+      mock.io(), [](const Request&, std::string*) { return true; }, &page);
+  page.guard = 1;
+  manual.drive({0.1, 0, 0, 0});
+  page.cut = 1;
+  EXPECT_THROW(manual.drive({0.1, 0, 0, 0}), JobError);
+  EXPECT_FALSE(mock.written.back().enable);
+  EXPECT_EQ(page.want_enable, 0U);
+  manual.drive({0.1, 0, 0, 0});  // it has let go
+  EXPECT_TRUE(mock.written.back().enable);
+}
+
 TEST(ManualDrive, WhoeverIsAskedMayStop) {
   Mock mock({});
   ManualDrive manual(mock.io(), [](const Request&, std::string*) { return false; });

@@ -1,6 +1,7 @@
 // The page that loop and guard share: each counts up once per tick, each watches the other's count.
 // In: a descriptor, for the page has no name that others could open -> out: counters, no locks, no futex.
-// The guard has stopped the motors when `cut` is set: the loop must disarm and say so.
+// When the guard has stopped the motors, `cut`, it believes the loop again once that has let go for a tick
+// and says which cut it means, `answered`: between two of the guard's polls the loop may let go and drive on.
 #pragma once
 
 #include <atomic>
@@ -18,6 +19,7 @@ struct HeartbeatPage {
   std::atomic<std::uint32_t> cut;          // times the guard has stopped the motors
   std::atomic<std::uint32_t> want_enable;  // 1: the loop drives; the guard keeps the bridges awake
   std::atomic<std::int64_t> cut_ns;        // monotonic; the motors were off by then, the last time
+  std::atomic<std::uint32_t> answered;     // the last cut for which the loop has let go
 };
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
                   std::atomic<std::int64_t>::is_always_lock_free,

@@ -46,6 +46,7 @@ class Supervisor {
     write_error_ = write_error;
     if (watched_.page != nullptr) {
       watched_.page->want_enable.store(driven ? 1 : 0, std::memory_order_relaxed);
+      if (!driven) watched_.page->answered.store(cut_, std::memory_order_relaxed);
       watched_.page->loop.fetch_add(1, std::memory_order_release);
     }
     if (!watched_.simulated_time) timing_.end(monotonic_now_ns());

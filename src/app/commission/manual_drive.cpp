@@ -35,7 +35,10 @@ RawSample ManualDrive::next() {
 }
 
 int ManualDrive::motors_off() noexcept {
-  if (heartbeat_ != nullptr) heartbeat_->want_enable.store(0, std::memory_order_relaxed);
+  if (heartbeat_ != nullptr) {
+    heartbeat_->want_enable.store(0, std::memory_order_relaxed);
+    heartbeat_->answered.store(heartbeat_->cut.load(std::memory_order_acquire), std::memory_order_relaxed);
+  }
   return hardware_.motors_off();
 }
 
@@ -44,6 +47,9 @@ void ManualDrive::beat() {
   heartbeat_->loop.fetch_add(1, std::memory_order_release);
   if (!guard_.alive(heartbeat_->guard.load(std::memory_order_acquire), runtime::monotonic_now_ns()))
     throw JobError("the guard process has died; motors are off");
+  if (heartbeat_->cut.load(std::memory_order_acquire) != heartbeat_->answered.load(std::memory_order_relaxed))
+    throw JobError(
+        "a tick came too late and the guard has switched the motors off: end other programs, try again");
 }
 
 void ManualDrive::off() {

@@ -22,7 +22,6 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
   GuardEnd end;
   runtime::BeatWatch loop(options.silent_ticks * options.period_ns);
   bool on = false;
-  bool cut = false;  // and the loop has not answered by letting go
   end.error = bridges.off();
   const std::int64_t poll_ns = options.period_ns / 4;  // seen late by one, acted on late by another
   std::int64_t due_ns = runtime::monotonic_now_ns();
@@ -35,8 +34,10 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
     page.guard.fetch_add(1, std::memory_order_release);
     const bool alive = loop.alive(page.loop.load(std::memory_order_acquire), now_ns);
     const bool asked = page.want_enable.load(std::memory_order_relaxed) != 0;
-    if (alive && !asked) cut = false;  // the loop has let go: what it asks for from now on it means
-    const bool wanted = alive && asked && !cut;
+    // Once the loop has let go it means what it asks for.
+    const bool answered =
+        page.answered.load(std::memory_order_relaxed) == page.cut.load(std::memory_order_relaxed);
+    const bool wanted = alive && asked && answered;
     if (wanted && !on) {
       const int error = bridges.enable();
       on = error == 0;
@@ -46,12 +47,11 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
       if (error != 0) end.error = error;
       on = false;
       if (!alive) {
-        cut = true;
         ++end.cuts;
         page.cut_ns.store(runtime::monotonic_now_ns(), std::memory_order_relaxed);
         page.cut.fetch_add(1, std::memory_order_release);
       }
-    } else if (!alive || cut) {
+    } else if (!alive || !answered) {
       (void)bridges.off();  // a stopped loop that wakes up may still write an old duty
     }
     if (now_ns >= next_watchdog_ns) {

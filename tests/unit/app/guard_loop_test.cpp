@@ -141,12 +141,17 @@ TEST_F(GuardLoop, CutsASilentLoopAndTakesNoWordOfItUntilItHasLetGo) {
   }
   EXPECT_EQ(bridges_.enables, 1);
   EXPECT_EQ(page_.cut, 1U);
-  page_.want_enable = 0;
+  page_.want_enable = 0;  // as a loop does that knows of no cut
   polls(3, true);
+  page_.want_enable = 1;
+  polls(3, true);
+  EXPECT_FALSE(bridges_.on);
+  page_.answered = 1;  // between two polls it has let go and drives on
+  polls(3, true);
+  EXPECT_TRUE(bridges_.on);
   const int offs = bridges_.offs;
   polls(10, true);
   EXPECT_EQ(bridges_.offs, offs);
-  turn_on();
   EXPECT_EQ(bridges_.enables, 2);
   EXPECT_EQ(finish().cuts, 1);
 }
@@ -373,13 +378,16 @@ TEST(Supervisor, AsksTheGuardForTheBridgesOfADrivenTick) {
   EXPECT_EQ(page.want_enable, 0U);
   supervisor.end(true, 0);
   EXPECT_EQ(page.want_enable, 1U);
+  EXPECT_EQ(page.answered, 0U) << "it has not let go";
   EXPECT_EQ(page.loop, 1U);
   EXPECT_EQ(begin(), 0U);
+  page.cut = 8;  // while the tick runs: of this one it does not know
   supervisor.end(false, 0);
   EXPECT_EQ(page.want_enable, 0U);
+  EXPECT_EQ(page.answered, 7U);
   EXPECT_EQ(page.loop, 2U);
   raw.t_ns = now_ns += 30'000'000;
-  EXPECT_EQ(supervisor.begin(now_ns, raw) & kGuardDead, 0U);  // silent for no more than 30 ms
+  EXPECT_EQ(supervisor.begin(now_ns, raw), kOverrun);  // silent for no more than 30 ms
   supervisor.end(false, 0);
   raw.t_ns = ++now_ns;
   EXPECT_EQ(supervisor.begin(now_ns, raw) & kGuardDead, kGuardDead);
