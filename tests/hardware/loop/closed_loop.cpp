@@ -112,8 +112,9 @@ struct PinWorld::World {
 
 template <class Firmware>
 struct PinWorld::WorldOf final : PinWorld::World {
+  // With the delays of the chip's filter, which the firmware on the board counts on.
   WorldOf(const typename Firmware::Config& config, std::uint64_t seed)
-      : world(Firmware::world(config, static_cast<std::size_t>(equipoise::Fidelity::kNominal), seed)) {}
+      : world(Firmware::world(config, static_cast<std::size_t>(equipoise::Fidelity::kBuilt2025), seed)) {}
   void advance(const MotorCommand& command) override { world.advance(command); }
   RawSample sense() override { return world.sense(); }
   double tilt_rad() const override {
