@@ -249,10 +249,24 @@ TEST_P(EveryBoard, CoastsWithinThreeTicksOfBeingKilled) {
   EXPECT_LE(ticksUntilOff(), 3);
 }
 
-TEST_P(ClosedLoop, CoastsWithinThreeTicksOfBeingStopped) {
+// The guard cuts, the loop lets go for a tick and goes on (safety.max_stalled_ticks), whatever the phase.
+TEST_P(ClosedLoop, CoastsWithinThreeTicksOfBeingStoppedAndStandsOnOnceItGoesOn) {
+  constexpr int kSettled = 3;
+  balance(kToBalance);
+  for (int stop = 0; stop < 5 && !HasFatalFailure(); ++stop) {
+    kill(child_, SIGSTOP);
+    EXPECT_LE(ticksUntilOff(), 3);
+    kill(child_, SIGCONT);
+    for (int i = 0; i < kSettled; ++i) world_->advance();
+    balance(kTicksPerSecond + 17);  // a second stall within a second is not tolerated
+  }
+}
+
+TEST_P(ClosedLoop, StaysOffOnceItWasStoppedForLonger) {
   balance(kToBalance);
   kill(child_, SIGSTOP);
   EXPECT_LE(ticksUntilOff(), 3);
+  for (int i = 0; i < world_->safety().max_stalled_ticks; ++i) world_->advance();
   kill(child_, SIGCONT);
   for (int i = 0; i < kTicksPerSecond / 2; ++i) {
     world_->advance();
