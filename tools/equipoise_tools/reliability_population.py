@@ -85,7 +85,8 @@ def population(options: argparse.Namespace) -> Part:
             (
                 f"{robot}: healthy imperfect robots",
                 "0 disarmed, 0 with a sensor excluded",
-                f"{len(healthy)} runs, {alarms} alarms; {of_robots(healthy, 'alarm')}",
+                f"{len(healthy)} runs, {alarms} alarms; {of_robots(healthy, 'alarm')}; "
+                f"{sum(c['unsafe'] for c in healthy)} of the runs judged unsafe",
                 alarms == 0 < len(healthy),
             )
         )
