@@ -162,9 +162,13 @@ def page_of(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
     noise_rows = ["| log | gyro x y z, rad/s | accelerometer x y z, m/s2 |", "|---|---|---|"]
     origin = ["| log | repository, commit | path | licence | sha256 |", "|---|---|---|---|---|"]
     for name, s in data["now"].items():
-        tilt = shown(s["tilt_std_rad"], 1e3, 1)
-        rows.append(f"| {name} | {s['judged_s']:.1f} | {causes(s)} | {nis(s)} | {tilt} |")
-        ahead_rows.append(f"| {name} | {ahead(s, 'tilt')} | {ahead(s, 'wheel')} |")
+        runs = {name: s}
+        if earlier := data.get("before", {}).get(name):
+            runs[f"{name}, {data['before_version']}"] = earlier
+        for run, x in runs.items():
+            tilt = shown(x["tilt_std_rad"], 1e3, 1)
+            rows.append(f"| {run} | {x['judged_s']:.1f} | {causes(x)} | {nis(x)} | {tilt} |")
+            ahead_rows.append(f"| {run} | {ahead(x, 'tilt')} | {ahead(x, 'wheel')} |")
         noise_rows.append(f"| {name} | {noise(s, 'gyro')} | {noise(s, 'accel')} |")
     known_rows = [
         "| log | fitted | rest: configured | identified | persistence | constant rate |",
