@@ -195,7 +195,8 @@ class SensorFaults {
       if (m.ratio <= -kMargin && nats > -kMargin) return jumped(i, u, z, nats);
     }
     const bool anew = m.ratio <= -kMargin || is_over(i);
-    if (anew && (h.waits() || (h.kind == FaultHypothesis::kReversed && !may_be_reversed(i))))
+    if (anew && (h.waits() || (h.kind == FaultHypothesis::kReversed && ticks_ > kArmingTicks &&
+                               !(members_[i - Wheels].ratio > 0.0))))  // wiring does not change in motion
       return m.refute(-kMargin);
     if (!h.waits()) {
       if constexpr (kRocks) {
@@ -277,10 +278,6 @@ class SensorFaults {
       if (its && !(members_[i].ratio > 0.0)) return false;
     }
     return true;
-  }
-  /// Wiring does not change in motion: then only while leaving the encoder out explains something.
-  bool may_be_reversed(std::size_t i) const noexcept {
-    return ticks_ <= kArmingTicks || members_[i - Wheels].ratio > 0.0;
   }
   /// A push or slip is; so is a fault by which the robot would have all but fallen, had it been one.
   bool is_over(std::size_t i) const noexcept {
