@@ -300,6 +300,11 @@ def firmware_load(console: str) -> dict[str, dict[str, int]] | None:
     return found if set(found) == set(ROBOTS) else None
 
 
+def standing_tick(robot: dict) -> int:
+    """Instructions of a tick of a robot that stands, as the emulated one does, by its share of cycles."""
+    return round(robot["tick"] * robot["modes"]["standing"]["mean"] / robot["tick_cycles"])
+
+
 def count_all(root: Path) -> dict:
     result: dict = {"x86": counted(Callgrind(root))}
     with tempfile.TemporaryDirectory() as folder:
@@ -318,7 +323,7 @@ def count_all(root: Path) -> dict:
         told = subprocess.run(commit, capture_output=True, text=True, check=True).stdout
         result["firmware"], result["firmware_commit"] = load, told.strip()
         a8 = result["cortex_a8"]
-        result["firmware_tick"] = {r: a8[r]["tick"] for r in ROBOTS} if a8 else None
+        result["firmware_tick"] = {r: standing_tick(a8[r]) for r in ROBOTS} if a8 else None
     return result
 
 
