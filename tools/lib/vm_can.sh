@@ -15,9 +15,9 @@ prepare_can_machine() {
     download_only amd64 "$image" "linux-headers-$version" "linux-headers-${version%-amd64}-common" linux-kbuild-6.1 \
       busybox-static
     rm -rf "$can_tree" "$vm/can-headers"
-    unpack "$can_tree" "$vm/debs/${image}"_*_amd64.deb "$vm/debs"/busybox-static_*_amd64.deb
-    unpack "$vm/can-headers" "$vm/debs/linux-headers-${version%-amd64}"{-amd64,-common}_*.deb \
-      "$vm/debs"/linux-kbuild-6.1_*_amd64.deb
+    unpack "$can_tree" "$debs/${image}"_*_amd64.deb "$debs"/busybox-static_*_amd64.deb
+    unpack "$vm/can-headers" "$debs/linux-headers-${version%-amd64}"{-amd64,-common}_*.deb \
+      "$debs"/linux-kbuild-6.1_*_amd64.deb
     printf '%s\n' "$version" >"$stamp"
   fi
   can_kernel_version=$(cat "$stamp")

@@ -9,6 +9,7 @@ use_kernel() {
   armhf) flavour=rt-armmp arch=arm triple=arm-linux-gnueabihf emulated=(qemu-system-arm -M "virt,highmem=off" -cpu cortex-a15) ;;
   arm64) flavour=rt-arm64 arch=arm64 triple=aarch64-linux-gnu emulated=(qemu-system-aarch64 -M virt -cpu cortex-a53) ;;
   esac
+  debs=$vm/debs-$1          # what download_only brings
   kernel_tree=$vm/kernel-$1 # lib/modules/VERSION, boot/
   kernel_headers=$vm/headers-$1
   modules_built=$vm/modules-$1
@@ -17,8 +18,8 @@ use_kernel armhf
 
 # prepare_kernel: sets kernel_version.
 prepare_kernel() {
-  local image version stamp=$kernel_tree.stamp debs=$vm/debs
-  if [ ! -f "$stamp" ]; then
+  local image version stamp=$kernel_tree.stamp
+  if [ ! -f "$stamp" ] || [ ! -d "$debs" ]; then
     rm -rf "$debs" "$kernel_tree" "$kernel_headers"
     image=$(package_of bookworm "$kernel_for" "linux-image-$flavour")
     version=${image#linux-image-}

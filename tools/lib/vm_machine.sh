@@ -3,13 +3,13 @@
 
 vm=$root/build/vm
 
-# download_only ARCHITECTURE PACKAGE...: just these, without what they depend on, into build/vm/debs.
+# download_only ARCHITECTURE PACKAGE...: just these, without what they depend on, into $debs.
 download_only() {
   local architecture=$1
   shift
-  mkdir -p "$vm/debs"
+  mkdir -p "$debs"
   foreign_apt "$architecture" bookworm --version >/dev/null # makes the private root
-  (cd "$vm/debs" && foreign_apt "$architecture" bookworm download "$@" >&2) || die "could not download: $*"
+  (cd "$debs" && foreign_apt "$architecture" bookworm download "$@" >&2) || die "could not download: $*"
 }
 
 unpack() { # DIRECTORY DEB...
