@@ -9,6 +9,7 @@
 #include <linux/irq_sim.h>
 #include <linux/irqdomain.h>
 #include <linux/module.h>
+#include <linux/platform_device.h>
 #include <linux/spi/spi.h>
 #include <linux/uaccess.h>
 
@@ -159,6 +160,7 @@ static u32 functionality(struct i2c_adapter *adapter)
 static const struct i2c_algorithm algorithm = {.master_xfer = transfer, .functionality = functionality};
 static struct i2c_adapter adapter = {
     .owner = THIS_MODULE, .name = "robot_bench I2C2", .algo = &algorithm, .nr = 2};
+static struct platform_device *controller; /* by its name udev knows the IMU's bus */
 
 /* 14 bytes as the chip delivers them: accel, temperature, gyro, big-endian. */
 static ssize_t sample_write(struct file *file, const char __user *from, size_t size, loff_t *at)
@@ -288,9 +290,16 @@ int bench_imu_init(struct dentry *dir)
 	debugfs_create_u8("imu_who_am_i", 0644, dir, &who_am_i);
 	debugfs_create_u32("imu_transfers", 0444, dir, &transfers);
 	bench_fault_files("imu", dir, &fault);
+	controller = platform_device_register_simple("4819c000.i2c", PLATFORM_DEVID_NONE, NULL, 0);
+	err = PTR_ERR_OR_ZERO(controller);
+	if (err)
+		goto no_controller;
+	adapter.dev.parent = &controller->dev;
 	err = i2c_add_numbered_adapter(&adapter);
 	if (!err)
 		return 0;
+	platform_device_unregister(controller);
+no_controller:
 	bench_spi_exit();
 no_spi:
 	irq_dispose_mapping(irq_find_mapping(domain, 0));
@@ -303,6 +312,7 @@ void bench_imu_exit(void)
 {
 	unbind();
 	i2c_del_adapter(&adapter);
+	platform_device_unregister(controller);
 	bench_spi_exit();
 	irq_dispose_mapping(irq_find_mapping(domain, 0));
 	irq_domain_remove_sim(domain);
