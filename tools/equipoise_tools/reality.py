@@ -222,6 +222,7 @@ def page_of(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(prog="tools/reality", description=__doc__)
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--before", action="store_true")
     parser.add_argument("--write", action="store_true")
     arguments = parser.parse_args()
     root = repository_root()
@@ -262,6 +263,8 @@ def main() -> int:
     else:
         data["version"], data["date"] = commit, today
     data["now"] |= done
+    if arguments.before:
+        data["before"], data["before_version"] = dict(data["now"]), data["version"]
     for shadow in done.values():
         for key in ("log", "config", "version"):
             shadow.pop(key, None)
