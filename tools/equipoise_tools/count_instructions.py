@@ -29,7 +29,7 @@ from .count_page import (
     write_page,
 )
 from .entry import leave
-from .paths import UserError, repository_root
+from .paths import UserError, commit_and_date, repository_root
 
 TICKS = (600, 1000)  # after arming, when the isolation's bank runs under suspicion only
 STEPS = (200, 600)
@@ -319,9 +319,7 @@ def count_all(root: Path) -> dict:
         before = json.loads((root / TABLE).read_text(encoding="utf-8"))
         result |= {k: before[k] for k in ("firmware", "firmware_commit", "firmware_tick")}
     else:
-        commit = ["git", "-C", str(root), "rev-parse", "--short=7", "HEAD"]
-        told = subprocess.run(commit, capture_output=True, text=True, check=True).stdout
-        result["firmware"], result["firmware_commit"] = load, told.strip()
+        result["firmware"], (result["firmware_commit"], _) = load, commit_and_date()
         a8 = result["cortex_a8"]
         result["firmware_tick"] = {r: standing_tick(a8[r]) for r in ROBOTS} if a8 else None
     return result
