@@ -61,6 +61,25 @@ TEST(Smoother, TakesTheRollingOutOfTheAccelerometer) {
             2.0 * body.error_rad(smooth(body.samples, kRadius_m, kHeight_m)));
 }
 
+/// Of an accelerometer that is shaken too hard to tell.
+TEST(Smoother, ReadsTheBiasWhereTheRobotStands) {
+  const Vec3 bias(0.01, -0.02, 0.005);
+  Swaying body(bias);
+  std::mt19937 random(1);
+  std::normal_distribution<double> gauss;
+  for (SmootherSample& s : body.samples) s.accel_m_s2 += 10.0 * Vec3(gauss(random), gauss(random), 0.0);
+  EXPECT_GT(std::abs(smooth(body.samples, kRadius_m, kHeight_m).bias_rad_s[1500].x() - bias.x()), 5e-4);
+  for (std::size_t k = 0; k < 500; ++k) {
+    SmootherSample s;
+    s.gyro_rad_s = bias + 0.002 * Vec3(gauss(random), gauss(random), gauss(random));
+    s.accel_m_s2 = Vec3(0.0, 0.0, kGravity_m_s2);
+    s.imu_ok = true;
+    body.samples[k] = s;
+  }
+  const Smoothed found = smooth(body.samples, kRadius_m, kHeight_m);
+  EXPECT_LT((found.bias_rad_s[1500] - bias).cwiseAbs().maxCoeff(), 4e-4);
+}
+
 TEST(Smoother, BridgesAGap) {
   const Swaying body(Vec3::Zero(), 5.0);
   EXPECT_LT(body.error_rad(smooth(body.samples, kRadius_m, kHeight_m)), 2e-3);

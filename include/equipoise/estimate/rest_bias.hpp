@@ -32,6 +32,14 @@ class RestBias {
   }
   /// Standard deviation of the samples, at rest.
   const Vec3& noise_rad_s() const noexcept { return noise_; }
+  /// For two seconds until this sample the robot has stood, and no hand held it: means of an eighth of a
+  /// second scatter as the samples' noise lets them.
+  bool stands() const noexcept {
+    return in_block_ == 0 && samples_ == kWindow &&
+           (scatter_.array() < kStands / kBlock * noise_.array().square()).all();
+  }
+  /// Standard deviation of those means.
+  Vec3 scatter_rad_s() const noexcept { return scatter_.cwiseSqrt(); }
   /// The robot has been at rest since power-on: the bias is known.
   bool known() const noexcept { return known_; }
 
@@ -39,6 +47,8 @@ class RestBias {
   static constexpr double kRange_rad_s = 35.0;  // of the sensor, 2000 deg/s; NaN fails, too
   static constexpr int kBlock = 25;    // ticks, 0.125 s: the mean of hand tremor (8 to 12 Hz) vanishes
   static constexpr int kWindow = 400;  // ticks of the stretch that count
+  // Times the variance that noise leaves in means: by chance 1 in 1e5 (chi squared, 15 degrees of freedom).
+  static constexpr double kStands = 3.0;
   // A bias that is off by this is found in motion (initial_sigma of the filters: 0.005 rad/s, 4 sigma).
   static constexpr double kTurns_rad_s = 0.02;
   static constexpr double kSigmas = 4.0;  // of the means' noise
@@ -58,9 +68,15 @@ class RestBias {
         ((mean.cwiseAbs() - tolerance).array() < kLargest_rad_s).all() && noise.maxCoeff() < kRough_rad_s;
     const bool same = ((mean - mean_).cwiseAbs().array() < tolerance.array()).all();
     samples_ = !plausible ? 0 : samples_ > 0 && same ? std::min(samples_ + kBlock, kWindow) : kBlock;
-    if (samples_ == kBlock) mean_ = mean;
+    if (samples_ == kBlock) {
+      mean_ = mean;
+      scatter_ = Vec3::Zero();
+    }
     if (samples_ <= kBlock) return;
-    mean_ += (mean - mean_) * kBlock / samples_;
+    const double share = static_cast<double>(kBlock) / samples_;
+    const Vec3 off = mean - mean_;
+    mean_ += share * off;
+    scatter_ = (1.0 - share) * (scatter_ + share * off.cwiseAbs2());
     bias_ = mean_;
     noise_ = noise;
     known_ = true;
@@ -72,6 +88,7 @@ class RestBias {
   Vec3 mean_ = Vec3::Zero();  // of the stretch
   Vec3 bias_ = Vec3::Zero();
   Vec3 noise_ = Vec3::Zero();
+  Vec3 scatter_ = Vec3::Zero();  // variance of the means
   int in_block_ = 0;
   int samples_ = 0;  // in the stretch
   bool known_ = false;

@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "equipoise/estimate/rest_bias.hpp"
+
 namespace equipoise::app {
 namespace {
 
@@ -74,6 +76,15 @@ std::vector<Vec3> felt_gravity(const std::vector<SmootherSample>& s, double radi
   return out;
 }
 
+/// `z` measures the states from `first` on, times `scale`.
+void correct(State* x, Matrix6* P, int first, double scale, const Vec3& z, const Vec3& variance) {
+  const Mat3 S = scale * scale * P->block<3, 3>(first, first) + Mat3(variance.asDiagonal());
+  const Mat<6, 3> K = scale * P->middleCols<3>(first) * S.inverse();
+  *x += K * (z - scale * x->segment<3>(first));
+  *P -= scale * K * P->middleRows<3>(first);
+  *P = 0.5 * (*P + P->transpose().eval());
+}
+
 struct Step {
   State x_predicted, x;
   Matrix6 P_predicted, P, F;
@@ -92,6 +103,7 @@ std::vector<State> pass(const std::vector<SmootherSample>& s, const std::vector<
   Q.diagonal() << Vec3::Constant(kGyroDensity * kGyroDensity * kTickS),
       Vec3::Constant(kBiasWalk * kBiasWalk * kTickS);
   Vec3 gyro = s.front().gyro_rad_s;
+  RestBias rest;
   for (std::size_t k = 0; k < s.size(); ++k) {
     Step& step = steps[k];
     const Vec3 before = gyro;
@@ -107,13 +119,9 @@ std::vector<State> pass(const std::vector<SmootherSample>& s, const std::vector<
     }
     step.x_predicted = x;
     step.P_predicted = P;
-    if (s[k].imu_ok) {
-      const Mat3 S = kGravity_m_s2 * kGravity_m_s2 * P.topLeftCorner<3, 3>() + variance * Mat3::Identity();
-      const Mat<6, 3> K = kGravity_m_s2 * P.leftCols<3>() * S.inverse();
-      x += K * (gravity[k] - kGravity_m_s2 * x.head<3>());
-      P -= kGravity_m_s2 * K * P.topRows<3>();
-      P = 0.5 * (P + P.transpose().eval());
-    }
+    if (s[k].imu_ok) correct(&x, &P, 0, kGravity_m_s2, gravity[k], Vec3::Constant(variance));
+    const Vec3 bias = rest.update(gyro);
+    if (rest.stands()) correct(&x, &P, 3, 1.0, bias, rest.scatter_rad_s().cwiseAbs2());
     step.x = x;
     step.P = P;
   }

@@ -1,5 +1,6 @@
-// Tilt by the whole log: gravity's direction in body axes and the gyro's bias, by a Kalman filter forwards
-// and Rauch, Tung and Striebel's pass back. Knows nothing of motors or masses, so it judges filters that do.
+// Tilt by the whole log: gravity's direction in body axes and the gyro's bias, which it reads where the robot
+// stands, by a Kalman filter forwards and Rauch, Tung and Striebel's pass back. Knows nothing of motors or
+// masses, so it judges filters that do.
 // In: calibrated samples -> out: tilt and bias per tick. Source: Rauch, Tung, Striebel, AIAA J. 3(8), 1965.
 #pragma once
 

@@ -85,6 +85,22 @@ TEST(RestBias, FollowsASlowBiasOverTwoSeconds) {
   EXPECT_NEAR(after(&bias, 400, Vec3(0.01, 0.0, 0.0)).x(), expected, 1e-12);
 }
 
+TEST(RestBias, TellsATableFromAHand) {
+  const double sigma = 0.001;
+  RestBias table;
+  after(&table, 375, kBias, sigma);
+  EXPECT_FALSE(table.stands()) << "a hand may be as still for so long";
+  after(&table, 25, kBias, sigma);
+  EXPECT_TRUE(table.stands());
+  EXPECT_GT(table.scatter_rad_s().minCoeff(), 0.5 * sigma / 5) << "of a mean of 25";
+  EXPECT_LT(table.scatter_rad_s().maxCoeff(), 1.8 * sigma / 5);
+  RestBias hand;
+  for (int i = 0; i < 4000; ++i) {  // sways by 0.005 rad/s at 0.5 Hz
+    after(&hand, 1, kBias + Vec3(0.005 * std::sin(kPi * i * kTickS), 0.0, 0.0), sigma);
+    EXPECT_FALSE(hand.stands());
+  }
+}
+
 TEST(RestBias, ASampleThatIsNoNumberIsNoRest) {
   RestBias bias;
   after(&bias, 30, kBias);
