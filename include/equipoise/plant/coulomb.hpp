@@ -37,13 +37,14 @@ inline Vec3 uncoupled_coulomb_torque(const Vec3& free_rate, const Vec3& mobility
 }
 
 /// Coupled axes, each with its own limit: the same rule by projected Gauss-Seidel sweeps.
-inline Vec2 coulomb_torque(const Vec2& free_rate, const Mat<2, 2>& mobility, double step_s,
-                           const Vec2& mu_c) noexcept {
+template <int N>
+Vec<N> coulomb_torque(const Vec<N>& free_rate, const Mat<N, N>& mobility, double step_s,
+                      const Vec<N>& mu_c) noexcept {
   constexpr int kSweeps = 20;
-  Vec2 tau = Vec2::Zero();
+  Vec<N> tau = Vec<N>::Zero();
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    const Vec2 before = tau;
-    for (int i = 0; i < 2; ++i) {
+    const Vec<N> before = tau;
+    for (int i = 0; i < N; ++i) {
       const double rate = free_rate(i) + step_s * mobility.row(i).dot(tau);
       tau(i) = std::clamp(tau(i) - rate / (step_s * mobility(i, i)), -mu_c(i), mu_c(i));
     }

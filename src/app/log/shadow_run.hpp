@@ -11,6 +11,7 @@
 #include "app/log/smoother.hpp"
 #include "app/text/reasons.hpp"
 #include "app/trial/firmware_of.hpp"
+#include "equipoise/plant/coulomb.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "robots/mbbr/estimators.hpp"
 #include "robots/mip/estimators.hpp"
@@ -35,8 +36,9 @@ struct MipShadowModel {
   static Vec2 tilt(const Motion& m) { return {m(0), 0.0}; }
   static Vec2 rolled(const Motion& m) { return {m(1), 0.0}; }
   static Vec2 rolling_rate(const Motion& m) { return {m(4), 0.0}; }
-  Vec2 wheel_rates(const Motion& m) const { return kinematics.wheels(m(4), m(5)); }
   Vec2 rolling(const Vec2& wheels) const { return {kinematics.phi(wheels), 0.0}; }
+  Vec2 rubbing_rate(const Motion& m) const { return kinematics.wheels(m(4), m(5)); }  // each gear
+  Vec2 input_of(const Vec2& friction) const { return kinematics.axes_from_wheels(friction); }
 
   MipEkfModel model;
   MipKinematics kinematics;
@@ -64,10 +66,9 @@ struct MbbrShadowModel {
   static Vec2 tilt(const Motion& m) { return m.head<2>(); }
   static Vec2 rolled(const Motion& m) { return m.segment<2>(MbbrEkfModel::kE) - m.head<2>(); }
   static Vec2 rolling_rate(const Motion& m) { return Observable::encoder_rate_B(m).head<2>(); }
-  Vec3 wheel_rates(const Motion& m) const {
-    return kinematics.wheels_from_ball(Observable::encoder_rate_B(m));
-  }
   Vec2 rolling(const Vec3& wheels) const { return kinematics.ball_from_wheels(wheels).head<2>(); }
+  static Vec3 rubbing_rate(const Motion& m) { return Observable::encoder_rate_B(m); }  // about each body axis
+  static Vec3 input_of(const Vec3& friction) { return friction; }
 
   MbbrEkfModel model;
   MbbrKinematics kinematics;
@@ -148,8 +149,19 @@ class ShadowRun {
     samples_ = std::move(samples);
   }
 
-  Input net(const std::array<double, 3>& u, const Wheels& rates) const {
-    return Eigen::Map<const Input>(u.data()) - kinematics_.friction_input(params_.friction, rates);
+  /// What is left of the log's voltage after Coulomb friction, which slows what turns and holds what stands.
+  Input net(const std::array<double, 3>& u, const Motion& m, const Input& disturbance) const {
+    const Input drive = Eigen::Map<const Input>(u.data());
+    const Input beside = drive + disturbance;
+    const auto rate = [&](const Input& acts) {
+      return model_.rubbing_rate(model_.model.ahead(m, acts, kTickS));
+    };
+    const Input free = rate(beside);
+    Mat<Robot::kInputs, Robot::kInputs> mobility;
+    for (int i = 0; i < Robot::kInputs; ++i)
+      mobility.col(i) = rate(beside + model_.input_of(Input::Unit(i))) - free;
+    return drive + model_.input_of(coulomb_torque<Robot::kInputs>(
+                       free, mobility, 1.0, Input::Constant(params_.friction.coulomb_u)));
   }
 
   void tick(std::size_t k) {
@@ -157,7 +169,7 @@ class ShadowRun {
     if (pipeline_ == nullptr) start(k);
     const bool drives = seeded_ && t.armed;
     if (!t.armed) seeded_ = false;
-    if (k > 0) pipeline_->applied(net(ticks_[k - 1].u, rates_), !drives);
+    if (k > 0) pipeline_->applied(net(ticks_[k - 1].u, motion_, disturbance_), !drives);
     Command command;
     command.arm = drives;
     const LoggedTick logged{t.now_ns, t.raw, 0};
@@ -167,7 +179,8 @@ class ShadowRun {
     runtime::run_tick(
         logged, *pipeline_, [&](std::int64_t, std::int64_t) { return command; }, keep, logged, &end);
     const auto health = pipeline_->estimators().health();
-    rates_ = health.predicts_wheels ? Wheels(health.wheel_rate_rad_s) : Wheels(result.z.wheel_rate_rad_s);
+    motion_ = Model::start(result.x_hat, pipeline_->estimators().ekf());
+    disturbance_ = pipeline_->estimators().ekf().disturbance();
     if (drives && result.arm_state == ArmState::kArmed) judge(k, result);
     watch(k, result, health);
     if (!seeded_ && t.armed && k >= from_ + kBefore) {
@@ -252,7 +265,7 @@ class ShadowRun {
         const std::size_t then = k + h;
         if (then >= ticks_.size() || !judged_[then] || estimates_[then].seeded_at != estimates_[k].seeded_at)
           break;
-        m = model_.model.ahead(m, net(ticks_[then - 1].u, model_.wheel_rates(m)) + disturbance, kTickS);
+        m = model_.model.ahead(m, net(ticks_[then - 1].u, m, disturbance) + disturbance, kTickS);
         disturbance *= model_.keep;
         if (h != 1 && h != 20) continue;
         Ahead& a = out_.ahead[h == 1 ? "5ms" : "100ms"];
@@ -305,7 +318,8 @@ class ShadowRun {
   std::unique_ptr<P> pipeline_;
   bool seeded_ = false;
   std::size_t seeded_at_ = 0, from_ = 0;
-  Wheels rates_ = Wheels::Zero();
+  Motion motion_ = Motion::Zero();
+  Input disturbance_ = Input::Zero();
   std::uint32_t reasons_ = 0, degraded_ = 0;
   Shadow out_;
 };
