@@ -277,7 +277,12 @@ def test_real_logs_pass_their_checks(root, tmp_path, name):
     )
     shadow = json.loads(run("replay", log, "--shadow", "--json", "-").stdout)
     assert shadow["judged_s"] > 1
-    assert shadow["ahead"]["100ms"]["wheel"] < shadow["ahead"]["100ms"]["persistence"]["wheel"]
+    ahead = shadow["ahead"]["100ms"]
+    assert ahead["wheel"] < min(ahead[other]["wheel"] for other in ("persistence", "constant_rate"))
+    if name == "mini_segway_log278":
+        assert shadow["alarms"] == []
+        assert shadow["tilt_std_rad"] < 0.003
+        assert ahead["tilt"] < min(ahead[other]["tilt"] for other in ("persistence", "constant_rate"))
 
 
 def test_samples_that_are_none_are_no_noise(root, log, tmp_path):
