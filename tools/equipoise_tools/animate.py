@@ -174,7 +174,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, help="the picture, .gif")
     parser.add_argument("--from-s", type=float, default=0.0)
     parser.add_argument("--duration-s", type=float, default=8.0)
-    parser.add_argument("--fps", type=float, default=6.0)
+    parser.add_argument("--fps", type=float, default=5.0)
     parser.add_argument("--title", default="MBBR, simulated: 1 turn per second, 0.1 m/s")
     given = parser.parse_args(arguments)
     if given.fps <= 0 or given.duration_s <= 0:
