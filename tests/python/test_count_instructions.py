@@ -69,7 +69,7 @@ def committed(root):
 
 
 def grown(machine, robot, committed, *parts):
-    cost = count.costs(machine, robot)
+    cost = count.costs(machine, robot, detector="tick_of_one_filter" in parts)
     return {k: (committed[robot][k], cost[k]) for k in parts if cost[k] > GROWTH * committed[robot][k]}
 
 

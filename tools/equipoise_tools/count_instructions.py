@@ -227,8 +227,9 @@ def tick_profile(machine: Callgrind, robot: str) -> dict[str, float]:
     return tick | {"run": (many_run["total"] - few_run["total"]) / ticks}
 
 
-def costs(machine, robot: str) -> dict:
-    """Of a tick and its parts; the filter of a tick runs once, and more often while the bank does."""
+def costs(machine, robot: str, detector: bool = True) -> dict:
+    """Of a tick and its parts; the filter of a tick runs once, and more often while the bank does. Not `detector`:
+    without what says how much of it is the detector's."""
     stages = None
     if isinstance(machine, Callgrind):
         stages = tick_profile(machine, robot)
@@ -237,12 +238,11 @@ def costs(machine, robot: str) -> dict:
         run = per(machine.total, robot, "run", TICKS)
         tick, log = per(machine.total, robot, "ticks", TICKS) - run, None
     packed = per(machine.total, robot, "packed", STEPS)
-    filters = per(machine.filters, robot, "filters", TICKS)
     return {
         "tick": tick,
-        "filters": filters,
+        "filters": per(machine.filters, robot, "filters", TICKS) if detector else None,
         "filter": packed,
-        "tick_of_one_filter": alone(machine.total, robot),
+        "tick_of_one_filter": alone(machine.total, robot) if detector else None,
         "simulated_tick": run,
         "log": log,
         "stages": stages,
