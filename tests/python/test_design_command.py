@@ -102,7 +102,8 @@ def test_the_shipped_design_has_every_margin_at_every_yaw_rate(root):
     ],
 )
 def test_margins_tell_a_bad_weight_a_bad_filter_and_a_late_chain(root, setting, missed):
-    assert any(missed in s for s in shortfalls(design(root, "mbbr", f"--set={setting}")))
+    rates = ("--step-hz", "1.5")
+    assert any(missed in s for s in shortfalls(design(root, "mbbr", f"--set={setting}", *rates)))
 
 
 def test_the_page_says_what_a_gain_on_the_balls_rate_costs(root):
