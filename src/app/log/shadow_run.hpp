@@ -102,7 +102,6 @@ class ShadowRun {
   using Robot = typename P::RobotType;
   using Model = decltype(shadow_model(std::declval<typename P::Params>().estimators));
   using Motion = typename Model::Motion;
-  using Wheels = typename P::Wheels;
   using Input = typename P::Input;
   using Health = EstimatorHealth<Robot::kWheels>;
 
@@ -112,7 +111,6 @@ class ShadowRun {
         radius_m_(radius_m),
         imu_height_m_(imu_height_m),
         ticks_(std::move(ticks)),
-        kinematics_(params.robot),
         model_(params.estimators) {}
 
   Shadow run() {
@@ -131,11 +129,10 @@ class ShadowRun {
   static constexpr std::uint32_t kNotOurs = kNotRequested | kCommandStale | kOverrun | kSaturated | kStall |
                                             kBatteryLow | kNotCalibrated | kRealtimeMissing | kGuardDead;
 
-  /// Nothing that it asks of the motors happens, and friction takes its whole share of the log's voltage.
+  /// Nothing that it asks of the motors happens.
   static typename P::Params of_shadow(typename P::Params p) {
     p.safety.encoder_check_drive = p.safety.encoder_probe_drive = 0.0;
     p.safety.max_saturated_s = p.safety.max_stall_s = 1e6;
-    p.friction.gain = 1.0;
     return p;
   }
 
@@ -309,7 +306,6 @@ class ShadowRun {
   typename P::Params params_;
   double radius_m_, imu_height_m_;
   std::vector<ShadowTick> ticks_;
-  typename Robot::Kinematics kinematics_;
   Model model_;
   std::vector<SmootherSample> samples_;
   Smoothed smoothed_;
