@@ -228,8 +228,9 @@ def tick_profile(machine: Callgrind, robot: str) -> dict[str, float]:
 
 
 def costs(machine, robot: str, detector: bool = True) -> dict:
-    """Of a tick and its parts; the filter of a tick runs once, and more often while the bank does. Not `detector`:
-    without what says how much of it is the detector's."""
+    """Of a tick and its parts; the filter of a tick runs once, and more often while the bank does.
+
+    Not `detector`: without what says how much of it is the detector's."""
     stages = None
     if isinstance(machine, Callgrind):
         stages = tick_profile(machine, robot)
