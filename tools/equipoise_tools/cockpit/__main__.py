@@ -90,7 +90,7 @@ async def serve(options: argparse.Namespace) -> int:
     try:
         sockets = tornado.netutil.bind_sockets(options.port, "127.0.0.1")
     except OSError as error:
-        raise UserError(f"--port {options.port}: {error.strerror}") from None
+        raise UserError(f"--port {options.port}: {error.strerror}; --port 0 takes any free one") from None
     cockpit.port = sockets[0].getsockname()[1]
     url = options.telemetry or private_url()
     source = open_source(url)

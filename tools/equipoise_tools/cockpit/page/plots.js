@@ -100,7 +100,7 @@ export class Plots {
         ...this.size(),
         cursor: { sync: { key: "cockpit" }, drag: { x: true, y: false, setScale: true } },
         scales: { x: { time: false }, y: { range: (u, lo, hi) => (Number.isFinite(lo) && hi > lo ? [lo - .08 * (hi - lo), hi + .08 * (hi - lo)] : [(lo || 0) - 1, (hi || 0) + 1]) } },
-        axes: [{ ...axis, size: 30 }, { ...axis, size: 46 }],
+        axes: [{ ...axis, size: 30 }, { ...axis, size: 54, space: 18 }],
         series: [{ label: "t (s)", value: (u, v) => (v == null ? "" : v.toFixed(2)) },
           ...series.map(([, label, colour, dash]) => ({ label, stroke: COLOURS[colour], width: 1.4, dash,
             value: (u, v) => (v == null || Number.isNaN(v) ? "" : v.toFixed(2)) }))],
