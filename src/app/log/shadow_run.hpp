@@ -178,7 +178,7 @@ class ShadowRun {
     const auto health = pipeline_->estimators().health();
     motion_ = Model::start(result.x_hat, pipeline_->estimators().ekf());
     disturbance_ = pipeline_->estimators().ekf().disturbance();
-    if (drives && result.arm_state == ArmState::kArmed) judge(k, result);
+    if (drives && result.arm_state == ArmState::kArmed) judge(k);
     watch(k, result, health);
     if (!seeded_ && t.armed && k >= from_ + kBefore) {
       pipeline_->estimators().start_moving(smoothed_.tilt_rad[k], smoothed_.bias_rad_s[k], result.z);
@@ -196,11 +196,10 @@ class ShadowRun {
     reasons_ = degraded_ = 0;
   }
 
-  void judge(std::size_t k, const typename P::Result& t) {
+  void judge(std::size_t k) {
     judged_[k] = true;
     out_.judged_s += kTickS;
-    estimates_[k] = {Model::start(t.x_hat, pipeline_->estimators().ekf()),
-                     pipeline_->estimators().ekf().disturbance(), seeded_at_};
+    estimates_[k] = {motion_, disturbance_, seeded_at_};
     const auto& nis = pipeline_->estimators().ekf().row_nis();
     for (std::size_t i = 0; i < nis.size(); ++i)
       if (nis[i] > 0.0) out_.nis[Model::kRows[i]].add(nis[i]);
