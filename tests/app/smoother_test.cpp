@@ -80,6 +80,20 @@ TEST(Smoother, ReadsTheBiasWhereTheRobotStands) {
   EXPECT_LT((found.bias_rad_s[1500] - bias).cwiseAbs().maxCoeff(), 4e-4);
 }
 
+/// As a robot does that jumps up: half a second of skids, off by 2 m/s2 on the mean.
+TEST(Smoother, TakesLittleFromWhereTheRobotSkids) {
+  Swaying body(Vec3::Zero());
+  std::mt19937 random(1);
+  std::normal_distribution<double> gauss;
+  for (std::size_t k = 0; k < 100; ++k) body.samples[k].accel_m_s2.y() += -2.0 + 6.0 * gauss(random);
+  body.samples.resize(400);
+  body.tilt_rad.resize(400);
+  const Smoothed s = smooth(body.samples, kRadius_m, kHeight_m);
+  EXPECT_LT(body.error_rad(s), 4e-3);
+  EXPECT_LT(std::abs(s.bias_rad_s[200].x()), 4e-3);
+  EXPECT_LT(std::sqrt(s.tilt_variance[200].x()), 8e-3);
+}
+
 TEST(Smoother, BridgesAGap) {
   const Swaying body(Vec3::Zero(), 5.0);
   EXPECT_LT(body.error_rad(smooth(body.samples, kRadius_m, kHeight_m)), 2e-3);

@@ -1,6 +1,7 @@
 #include "app/log/smoother.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "equipoise/estimate/rest_bias.hpp"
@@ -18,6 +19,7 @@ constexpr double kFirstBias = 0.1;       // rad/s, uncalibrated
 constexpr double kFirstYawBias = 0.005;  // gravity says nothing of it; taken off at rest
 constexpr double kRollingBand_Hz = 6.0;  // of the wheels' accelerations: encoders count in steps
 constexpr int kBlock = 100;              // ticks, longer than the body's vibration and sway
+constexpr int kPasses = 5;               // after which the blocks' variances stay
 
 Mat3 cross(const Vec3& v) {
   Mat3 m;
@@ -90,8 +92,14 @@ struct Step {
   Matrix6 P_predicted, P, F;
 };
 
-std::vector<State> pass(const std::vector<SmootherSample>& s, const std::vector<Vec3>& gravity,
-                        double variance) {
+struct Smooth {
+  State x;
+  Matrix6 P;
+};
+
+/// `variance`: of a sample of gravity, per block.
+std::vector<Smooth> pass(const std::vector<SmootherSample>& s, const std::vector<Vec3>& gravity,
+                         const std::vector<double>& variance) {
   std::vector<Step> steps(s.size());
   State x = State::Zero();
   Vec3 first = Vec3::Zero();
@@ -119,53 +127,67 @@ std::vector<State> pass(const std::vector<SmootherSample>& s, const std::vector<
     }
     step.x_predicted = x;
     step.P_predicted = P;
-    if (s[k].imu_ok) correct(&x, &P, 0, kGravity_m_s2, gravity[k], Vec3::Constant(variance));
+    if (s[k].imu_ok) correct(&x, &P, 0, kGravity_m_s2, gravity[k], Vec3::Constant(variance[k / kBlock]));
     const Vec3 bias = rest.update(gyro);
     if (rest.stands()) correct(&x, &P, 3, 1.0, bias, rest.scatter_rad_s().cwiseAbs2());
     step.x = x;
     step.P = P;
   }
-  std::vector<State> out(s.size());
-  out.back() = steps.back().x;
+  std::vector<Smooth> out(s.size());
+  out.back() = {steps.back().x, steps.back().P};
   for (std::size_t k = s.size() - 1; k > 0; --k) {
     const Step& step = steps[k - 1];
     const Step& next = steps[k];
     const Matrix6 gain = step.P * next.F.transpose() * next.P_predicted.inverse();
-    out[k - 1] = step.x + gain * (out[k] - next.x_predicted);
+    out[k - 1].x = step.x + gain * (out[k].x - next.x_predicted);
+    out[k - 1].P = step.P + gain * (out[k].P - next.P_predicted) * gain.transpose();
   }
   return out;
 }
 
-/// What one sample's white noise would have to be to make the means of blocks as uncertain as they are.
-double variance_of(const std::vector<Vec3>& gravity, const std::vector<State>& x) {
-  double sum = 0.0;
-  int blocks = 0;
-  for (std::size_t k = 0; k + kBlock <= x.size(); k += kBlock) {
-    Vec3 mean = Vec3::Zero();
-    for (std::size_t i = k; i < k + kBlock; ++i)
-      mean += (gravity[i] - kGravity_m_s2 * x[i].head<3>()) / kBlock;
-    sum += mean.head<2>().squaredNorm() / 2.0;
-    ++blocks;
+/// What one sample's white noise would have to be to make the means of blocks as uncertain as they are; where
+/// samples scatter more than in the median block, as much more: a robot that skids says less of gravity.
+std::vector<double> variances_of(const std::vector<Vec3>& gravity, const std::vector<Smooth>& smooth) {
+  constexpr double kLeast = 1e-4;  // (m/s2)^2
+  std::vector<double> scatter;
+  double of_means = 0.0;
+  for (std::size_t k = 0; k < smooth.size(); k += kBlock) {
+    const std::size_t end = std::min(smooth.size(), k + kBlock);
+    const auto n = static_cast<double>(end - k);
+    Vec2 sum = Vec2::Zero();
+    double squares = 0.0;
+    for (std::size_t i = k; i < end; ++i) {
+      const Vec2 off = (gravity[i] - kGravity_m_s2 * smooth[i].x.head<3>()).head<2>();
+      sum += off;
+      squares += off.squaredNorm();
+    }
+    of_means += sum.squaredNorm() / (2.0 * n);
+    scatter.push_back(std::max(kLeast, (squares - sum.squaredNorm() / n) / (2.0 * n)));
   }
-  constexpr double kFirst = 1.0;  // 0.1 m/s2 over a block of half a second
-  return blocks < 3 ? kFirst : std::max(kBlock * sum / blocks, 1e-4);
+  std::vector<double> sorted = scatter;
+  const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), median, sorted.end());
+  double times = 0.0;
+  for (double& each : scatter) times += each = std::max(1.0, each / *median);
+  for (double& each : scatter) each *= std::max(kLeast, of_means / times);
+  return scatter;
 }
 
 }  // namespace
 
 Smoothed smooth(const std::vector<SmootherSample>& samples, double radius_m, double imu_height_m) {
   const std::vector<Vec3> gravity = felt_gravity(samples, radius_m, imu_height_m);
-  double variance = 1.0;
-  std::vector<State> x;
-  for (int i = 0; i < 3; ++i) {
-    x = pass(samples, gravity, variance);
-    variance = variance_of(gravity, x);
+  std::vector<double> variance(samples.size() / kBlock + 1, 1.0);  // 0.1 m/s2 over a block of half a second
+  std::vector<Smooth> smooth;
+  for (int i = 0; i < kPasses; ++i) {
+    smooth = pass(samples, gravity, variance);
+    variance = variances_of(gravity, smooth);
   }
   Smoothed out;
-  for (const State& each : x) {
-    out.tilt_rad.emplace_back(std::atan2(each.y(), each.z()),
-                              -std::atan2(each.x(), std::hypot(each.y(), each.z())));
-    out.bias_rad_s.emplace_back(each.tail<3>());
+  for (const auto& [x, P] : smooth) {
+    out.tilt_rad.emplace_back(std::atan2(x.y(), x.z()), -std::atan2(x.x(), std::hypot(x.y(), x.z())));
+    out.tilt_variance.emplace_back(P(1, 1), P(0, 0));
+    out.bias_rad_s.emplace_back(x.tail<3>());
   }
   return out;
 }

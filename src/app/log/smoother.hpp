@@ -18,7 +18,8 @@ struct SmootherSample {
 };
 
 struct Smoothed {
-  std::vector<Vec2> tilt_rad;  // roll, pitch
+  std::vector<Vec2> tilt_rad;       // roll, pitch
+  std::vector<Vec2> tilt_variance;  // rad^2, of a mount that is known
   std::vector<Vec3> bias_rad_s;
 };
 
