@@ -119,8 +119,9 @@ TEST(TableChecks, EachHasALimit) {
   } rows[] = {
       {"rows", true, torn(1), "100 rows; 1 with another number"},
       {"rows", false, torn(2), "2 with another"},
-      {"clock", true, rate(0.099), "10.1 rows a second, longest step 99.0 ms"},
-      {"clock", false, rate(0.101), "too slow for balancing: is time.unit ms or us?"},
+      {"clock", true, rate(0.01), "100.0 rows a second, longest step 10.0 ms"},
+      {"clock", false, rate(0.0103),
+       "97.1 rows a second, longest step 10.3 ms; at least 100 are needed. Is time.unit ms or us?"},
       {"clock", true, rate(1.1e-5), "rows a second"},
       {"clock", false, rate(0.9e-5), "too fast for a control loop: is time.unit s or ms?"},
       {"clock", false, [](auto&, ImportedRows& r) { r.not_advancing = 3; },

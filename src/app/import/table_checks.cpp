@@ -40,15 +40,16 @@ std::vector<double> steps(const std::vector<double>& t_s) {
 }
 
 Check check_clock(const ImportedRows& rows) {
+  constexpr double kSlowest_s = 0.0102;  // 100 Hz and its jitter: a body falls within a tenth of a second
   const std::vector<double> dt = steps(rows.t_s);
   const double usual = median(dt);
   const double late = *std::max_element(dt.begin(), dt.end());
   Check c{"clock", std::nullopt, 1.0 / usual,
           format("%.1f rows a second, longest step %.1f ms", 1.0 / usual, 1e3 * late)};
-  c.ok = rows.not_advancing == 0 && usual > 1e-5 && usual < 0.1;
+  c.ok = rows.not_advancing == 0 && usual > 1e-5 && usual <= kSlowest_s;
   if (rows.not_advancing > 0)
     c.text += format("; %zu rows whose time does not advance are skipped", rows.not_advancing);
-  if (usual >= 0.1) c.text += "; too slow for balancing: is time.unit ms or us?";
+  if (usual > kSlowest_s) c.text += "; at least 100 are needed. Is time.unit ms or us?";
   if (usual <= 1e-5) c.text += "; too fast for a control loop: is time.unit s or ms?";
   return c;
 }
