@@ -1,6 +1,12 @@
-"""Runs `equipoise` of this build; robots whose logs tests share (conftest.py: robot, log)."""
+"""Runs `equipoise` of this build; robots whose logs tests share (conftest.py); real robots' logs."""
 
+import os
 import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+from equipoise_tools import reality
 
 CONFIGS = {"mbbr": "mbbr", "mip": "edumip"}
 
@@ -8,6 +14,18 @@ CONFIGS = {"mbbr": "mbbr", "mip": "edumip"}
 def equipoise(root, *arguments):
     command = [root / "build/host/equipoise", *arguments]
     return subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+
+
+def real_logs(root):
+    return Path(os.environ.get("EQUIPOISE_REAL_LOGS", root.parent / "shared/real"))
+
+
+def real_log(root, map_file):
+    """The log that a map is for; without it the test skips."""
+    source = tomllib.loads(map_file.read_text())["source"]
+    if log := reality.found(real_logs(root), source):
+        return log
+    return pytest.skip(f"no {source['path']}: docs/reality.md says where it is from")
 
 
 def rewritten(path, log, change, run=lambda message: None):

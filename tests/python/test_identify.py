@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pandas as pd
 import pytest
+from driven import real_logs
 from equipoise_tools.paths import binary, repository_root
 from equipoise_tools.table import matlab
 from scipy.signal import lfilter
@@ -135,7 +136,7 @@ def test_real_motors_are_as_published_or_refused(root, tmp_path, name):
     map_file = root / f"config/real/motors/{name}.toml"
     described = tomllib.loads(map_file.read_text())
     source = described["source"]
-    folder = root.parent / "shared/real" / source["repository"].replace("/", "+")
+    folder = real_logs(root) / source["repository"].replace("/", "+")
     files = sorted(folder.glob(source["path"]))
     if not files:
         pytest.skip(f"no {source['path']}: docs/reality.md says where it is from")

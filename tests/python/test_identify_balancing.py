@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from driven import real_log
 from equipoise_tools import planar_model as planar
 from equipoise_tools.identify_balancing import identify
 from equipoise_tools.paths import UserError
@@ -75,11 +76,9 @@ def test_wrong_signs_and_short_logs_are_refused(log):
 
 
 def test_intervals_from_a_real_ball_bot_hold_on_its_next_24_s(root):
-    table = root.parent / "shared/real/brandmcd+rob311-ballbot/main_control_1.txt"
-    if not table.exists():
-        pytest.skip(f"no {table.name}: docs/reality.md says where it is from")
-    command = [sys.executable, "-m", "equipoise_tools.identify_balancing", table, "--json"]
-    command += ["--map", root / "config/real/maps/rob311_main_control_1.toml"]
+    map_file = root / "config/real/maps/rob311_main_control_1.toml"
+    command = [sys.executable, "-m", "equipoise_tools.identify_balancing", real_log(root, map_file), "--json"]
+    command += ["--map", map_file]
 
     def result(*arguments):
         done = subprocess.run([*map(str, command), *arguments], capture_output=True, text=True, check=False)

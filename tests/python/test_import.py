@@ -11,10 +11,11 @@ import equipoise as types
 import numpy as np
 import pandas as pd
 import pytest
-from driven import rewritten
+from driven import real_log, rewritten
 from equipoise_robot import Log
 from equipoise_tools.paths import binary
 from scipy.io import savemat
+from scipy.spatial.transform import Rotation
 
 import lcm
 
@@ -145,6 +146,38 @@ def test_shadow_of_a_healthy_run_is_quiet_and_of_a_dead_gyro_axis_is_not(root, t
     assert unbounded or alarm["ratio"] > alarm["bound"] > 0, alarm
 
 
+def test_shadow_finds_the_mount_that_the_configuration_does_not_know(root, table, tmp_path):
+    out = checks(table, write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
+    edumip, config = root / "config/edumip.toml", tmp_path / "mounted.toml"
+    board = np.reshape(tomllib.loads(edumip.read_text())["calibration"]["R_BS"], (3, 3))
+    mounted = Rotation.from_euler("x", 0.03).as_matrix() @ board
+    config.write_text(f'base = "{edumip}"\n[calibration]\nR_BS = {mounted.ravel().tolist()}\n')
+    known = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
+    found = json.loads(run("replay", out["log"], "--shadow", "--config", config, "--json", "-").stdout)
+    assert found["mount_rad"][0] - known["mount_rad"][0] == pytest.approx(0.03, abs=0.001)
+    assert abs(found["tilt_offset_rad"]) < 0.001
+    assert found["tilt_std_rad"] == pytest.approx(known["tilt_std_rad"], abs=2e-4)
+
+
+def test_shadow_waits_until_the_robot_stands(root, table, tmp_path):
+    lying = pd.read_csv(table)  # for three seconds, then raised by hand
+    angle = 1.2 * np.clip(4.0 - lying.t, 0.0, 1.0)
+    for sensor in "ga":
+        up, back = lying[f"{sensor}y"].copy(), -lying[f"{sensor}z"]
+        lying[f"{sensor}y"] = np.cos(angle) * up - np.sin(angle) * back
+        lying[f"{sensor}z"] = -(np.cos(angle) * back + np.sin(angle) * up)
+    lying.gx += np.rad2deg(np.gradient(angle, lying.t))
+    down = lying.t < 3
+    lying.to_csv(tmp_path / "lying.csv", index=False)
+    out = checks(tmp_path / "lying.csv", write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
+    shadow = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
+    assert 14 < shadow["judged_s"] < 17 and shadow["alarms"] == []
+    lying[down].to_csv(tmp_path / "down.csv", index=False)
+    run("import", tmp_path / "down.csv", "--map", tmp_path / "map.toml", "-o", tmp_path / "down.lcm")
+    told = run("replay", tmp_path / "down.lcm", "--shadow").stdout
+    assert "judged 0.00 s" in told and "not armed: tilt" in told
+
+
 def test_shadow_runs_on_our_own_logs_of_both_robots(root, tmp_path):
     log = tmp_path / "ball.lcm"
     run("sim", "--config", root / "config/mbbr.toml", "--duration-s", 8, "--yaw-hz", 1, "--drive-mps", 0.1,
@@ -257,32 +290,24 @@ def test_wheel_order_and_azimuth_of_a_ball_bot_are_named(
         assert named in out["by_name"][check]["text"]
 
 
-# Real logs: of the folder beside the project, where there is one.
-REAL = {
-    "mini_segway_log278": "pichim+Mini_Segway/docs/matlab/LOG278.TXT",
-    "regbot_bal_log_2": "SebastianBitsch+robobot-project/regbot/matlab/mekanisk/b1/bal_log_2.txt",
-}
-
-
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", ["mini_segway_log278", "regbot_bal_log_1", "regbot_bal_log_2"])
 def test_real_logs_pass_their_checks(root, tmp_path, name):
-    table = root.parent / "shared/real" / REAL[name]
-    if not table.exists():
-        pytest.skip(f"no {table.name}: docs/reality.md says where it is from")
-    log = tmp_path / "real.lcm"
     map_file = root / f"config/real/maps/{name}.toml"
+    table, log = real_log(root, map_file), tmp_path / "real.lcm"
     out = json.loads(run("import", table, "--map", map_file, "-o", log, "--json", "-").stdout)
     assert not {"gyro_x_accel", "wheels_accel", "drive_wheels", "gyro_z_wheels", "accel_up"} & set(
         out["checks_failed"]
     )
     shadow = json.loads(run("replay", log, "--shadow", "--json", "-").stdout)
     assert shadow["judged_s"] > 1
+    assert shadow["alarms"] == []
     ahead = shadow["ahead"]["100ms"]
     assert ahead["wheel"] < min(ahead[other]["wheel"] for other in ("persistence", "constant_rate"))
+    assert shadow["tilt_std_rad"] < (0.003 if name == "mini_segway_log278" else 0.008)
     if name == "mini_segway_log278":
-        assert shadow["alarms"] == []
-        assert shadow["tilt_std_rad"] < 0.003
         assert ahead["tilt"] < min(ahead[other]["tilt"] for other in ("persistence", "constant_rate"))
+    if name == "regbot_bal_log_2":
+        assert all(0.5 < nis < 2 for nis in shadow["nis"].values()), shadow["nis"]
 
 
 def test_samples_that_are_none_are_no_noise(root, log, tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from driven import real_log
 from equipoise_tools import noise_comparison
 
 
@@ -39,19 +40,10 @@ def test_a_robot_unlike_the_others_is_told_from_its_own_population():
     assert noise_comparison.own_auc(alike[:1], 9) is None
 
 
-REAL = {
-    "mini_segway_log278": "pichim+Mini_Segway/docs/matlab/LOG278.TXT",
-    "regbot_bal_log_2": "SebastianBitsch+robobot-project/regbot/matlab/mekanisk/b1/bal_log_2.txt",
-}
-
-
 @pytest.mark.parametrize("name", noise_comparison.MOTIONS)
 def test_real_noise_lies_within_a_factor_of_the_population(root, name):
-    log = root.parent / "shared/real" / REAL[name]
-    if not log.exists():
-        pytest.skip("../shared/real is not there: real logs are not part of the project")
-    binary = root / "build/host/equipoise"
-    config, real = noise_comparison.real_motions(binary, log, root / f"config/real/maps/{name}.toml")
+    map_file, binary = root / f"config/real/maps/{name}.toml", root / "build/host/equipoise"
+    config, real = noise_comparison.real_motions(binary, real_log(root, map_file), map_file)
     made = [noise_comparison.simulated_motions(binary, config, robot) for robot in (1, 2, 3, 4)]
     result = noise_comparison.compare(real, made)
     # A gross error of unit, frame or shape is a factor of ten.

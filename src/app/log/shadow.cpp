@@ -49,6 +49,7 @@ nlohmann::json Shadow::json() const {
                      {"starts", starts},
                      {"alarms", list},
                      {"alarms_per_min", 60.0 * static_cast<double>(alarms.size()) / judged_s},
+                     {"mount_rad", {mount_rad.x(), mount_rad.y()}},
                      {"tilt_std_rad", tilt_std_rad(*this)},
                      {"tilt_offset_rad", mean_of(tilt_error_rad[0])},
                      {"tilt_std_own_rad", std::sqrt(variance_of(own_tilt_error_rad))}};
@@ -71,7 +72,14 @@ void Shadow::print(std::FILE* out) const {
     if (std::isfinite(a.ratio)) std::fprintf(out, " (%.3g, limit %.3g)", a.ratio, a.bound);
     std::fputc('\n', out);
   }
-  if (judged_s == 0.0) return;
+  if (judged_s == 0.0) {
+    for (const std::string& each : reason_names(refused))
+      std::fprintf(out, "    not armed: %s\n", each.c_str());
+    return;
+  }
+  std::fprintf(
+      out, "  mount, beside the configured one, at which accelerometer and model agree: %.1f, %.1f mrad\n",
+      1e3 * mount_rad.x(), 1e3 * mount_rad.y());
   std::fprintf(out, "  NIS per row:");
   for (const auto& [row, square] : nis)
     std::fprintf(out, "  %s %.2f", row.c_str(), square.sum / square.count);

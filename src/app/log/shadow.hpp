@@ -10,6 +10,7 @@
 
 #include "app/log/run_log.hpp"
 #include "app/text/json.hpp"
+#include "equipoise/types.hpp"
 
 namespace equipoise::app {
 
@@ -41,9 +42,11 @@ struct Ahead {
 };
 
 struct Shadow {
-  double judged_s = 0.0;  // armed, by the pipeline
-  int starts = 0;         // the first included
+  double judged_s = 0.0;      // armed, by the pipeline
+  int starts = 0;             // the first included
+  std::uint32_t refused = 0;  // SafetyReason bits of starts without arming, and of faults
   std::vector<ShadowAlarm> alarms;
+  Vec2 mount_rad = Vec2::Zero();                      // that the log tells, beside the configured one
   std::map<std::string, RootMeanSquare> nis;          // per row: root mean of NIS; 1: as the filter believes
   std::array<std::vector<double>, 2> tilt_error_rad;  // roll, pitch against the smoother
   std::vector<double> own_tilt_error_rad;             // against the log's own

@@ -113,17 +113,27 @@ class ShadowRun {
         ticks_(std::move(ticks)),
         model_(params.estimators) {}
 
+  /// With the mount at which accelerometer and model agree on the mean, as `calibrate` finds it on the robot.
   Shadow run() {
-    calibrate_all();
-    judged_.assign(ticks_.size(), false);
-    estimates_.resize(ticks_.size());
-    for (std::size_t k = 0; k < ticks_.size(); ++k) tick(k);
+    Vec2 mount_rad = Vec2::Zero();
+    for (int i = 0; i < kLevellings; ++i) {
+      follow();
+      const Vec2 off = offset_rad();
+      if (!(off.norm() > kLevel_rad)) break;
+      mount_rad += off;
+      params_.calibration.R_BS =
+          Eigen::AngleAxisd(-off.norm(), Vec3(off.x(), off.y(), 0.0).normalized()) * params_.calibration.R_BS;
+    }
+    follow();
+    out_.mount_rad = mount_rad;
     predict();
     measure_noise();
     return std::move(out_);
   }
 
  private:
+  static constexpr int kLevellings = 20;
+  static constexpr double kLevel_rad = 1e-4;
   static constexpr int kBefore = 20;   // ticks that the senses need before a start, and after a fault
   static constexpr int kSettle = 100;  // ticks after a start that the tilt's error does not count
   static constexpr std::uint32_t kNotOurs = kNotRequested | kCommandStale | kOverrun | kSaturated | kStall |
@@ -136,14 +146,37 @@ class ShadowRun {
     return p;
   }
 
+  void follow() {
+    out_ = {};
+    pipeline_.reset();
+    calibrate_all();
+    judged_.assign(ticks_.size(), false);
+    estimates_.assign(ticks_.size(), {});
+    for (std::size_t k = 0; k < ticks_.size(); ++k) tick(k);
+  }
+
+  /// Mean of the filter's tilt against the smoother's.
+  Vec2 offset_rad() const {
+    Vec2 sum = Vec2::Zero();
+    double n = 0.0;
+    for (std::size_t k = 0; k < ticks_.size(); ++k) {
+      if (!judged_[k] || k < estimates_[k].seeded_at + kBefore) continue;
+      sum.head<Model::kAxes>() +=
+          (Model::tilt(estimates_[k].motion) - smoothed_.tilt_rad[k]).template head<Model::kAxes>();
+      n += 1.0;
+    }
+    return sum / std::max(n, 1.0);
+  }
+
   void calibrate_all() {
-    std::vector<SmootherSample> samples;
+    samples_.clear();
+    wheels_.clear();
     for (const ShadowTick& t : ticks_) {
       const auto z = calibrate<Robot::kWheels>(t.raw, params_.calibration, false);
-      samples.push_back({z.gyro_B_rad_s, -z.accel_B_m_s2, model_.rolling(z.wheel_angle_rad), z.imu_ok});
+      wheels_.push_back(z.wheel_angle_rad);
+      samples_.push_back({z.gyro_B_rad_s, -z.accel_B_m_s2, model_.rolling(z.wheel_angle_rad), z.imu_ok});
     }
-    smoothed_ = smooth(samples, radius_m_, imu_height_m_);
-    samples_ = std::move(samples);
+    smoothed_ = smooth(samples_, radius_m_, imu_height_m_);
   }
 
   /// What is left of the log's voltage after Coulomb friction, which slows what turns and holds what stands.
@@ -178,18 +211,32 @@ class ShadowRun {
     const auto health = pipeline_->estimators().health();
     motion_ = Model::start(result.x_hat, pipeline_->estimators().ekf());
     disturbance_ = pipeline_->estimators().ekf().disturbance();
-    if (drives && result.arm_state == ArmState::kArmed) judge(k);
+    const bool armed = drives && result.arm_state == ArmState::kArmed;
+    if (armed) judge(k);
     watch(k, result, health);
+    if (armed && estimates_[k - 1].seeded_at != seeded_at_) ++out_.starts;
     if (!seeded_ && t.armed && k >= from_ + kBefore) {
+      result.z.wheel_rate_rad_s = wheel_rate_rad_s(k);
       pipeline_->estimators().start_moving(smoothed_.tilt_rad[k], smoothed_.bias_rad_s[k], result.z);
       seeded_ = true;
       seeded_at_ = k;
-      ++out_.starts;
     }
-    if (result.arm_state == ArmState::kFault) pipeline_.reset();
+    if (drives && !armed && t.raw.valid != 0) {
+      out_.refused |= result.reasons & ~kNotOurs;
+      pipeline_.reset();
+    }
   }
 
+  /// Across the ticks around this one; at the log's end across those before it.
+  Vec<Robot::kWheels> wheel_rate_rad_s(std::size_t k) const {
+    const std::size_t last = std::min(k + kBefore / 2, ticks_.size() - 1);
+    return (wheels_[last] - wheels_[last - kBefore]) / (kBefore * kTickS);
+  }
+
+  /// The smoother's tilt is surer than what a hand gives a robot that is armed.
   void start(std::size_t k) {
+    auto& sigma = params_.estimators.ekf.filter.initial_variance;
+    sigma.template head<Model::kAxes>() = smoothed_.tilt_variance[k].template head<Model::kAxes>();
     pipeline_ = std::make_unique<P>(params_);
     seeded_ = false;
     from_ = k;
@@ -307,6 +354,7 @@ class ShadowRun {
   std::vector<ShadowTick> ticks_;
   Model model_;
   std::vector<SmootherSample> samples_;
+  std::vector<Vec<Robot::kWheels>> wheels_;
   Smoothed smoothed_;
   std::vector<bool> judged_;
   std::vector<Estimated> estimates_;
