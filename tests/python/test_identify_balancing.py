@@ -77,11 +77,12 @@ def test_wrong_signs_and_short_logs_are_refused(log):
 
 def test_intervals_from_a_real_ball_bot_hold_on_its_next_24_s(root):
     map_file = root / "config/real/maps/rob311_main_control_1.toml"
-    command = [sys.executable, "-m", "equipoise_tools.identify_balancing", real_log(root, map_file), "--json"]
-    command += ["--map", map_file]
+    log = real_log(root, map_file)
+    command = [sys.executable, "-m", "equipoise_tools.identify_balancing", "--json", "--map", map_file]
 
-    def result(*arguments):
-        done = subprocess.run([*map(str, command), *arguments], capture_output=True, text=True, check=False)
+    def result(*arguments, table=log):
+        full = [*map(str, command), str(table), *arguments]
+        done = subprocess.run(full, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 
@@ -90,9 +91,12 @@ def test_intervals_from_a_real_ball_bot_hold_on_its_next_24_s(root):
         a, b = first["estimates"][name], second["estimates"][name]
         assert abs(a["value"] - b["value"]) < np.hypot(a["half_width_95"], b["half_width_95"]), name
         assert a["half_width_95"] < 0.4 * a["value"]
-    for which in ("ahead_configured", "ahead_identified"):
-        ahead = first[which]
+    other = result(table=log.with_name("main_control_autotune_1.txt"))  # nothing was chosen on it
+    for ahead in (
+        each[which] for each in (first, other) for which in ("ahead_configured", "ahead_identified")
+    ):
         assert ahead["model"]["wheel"] < 0.4 * ahead["constant_rate"]["wheel"]
+        assert ahead["model"]["tilt"] < ahead["persistence"]["tilt"] < ahead["constant_rate"]["tilt"]
 
 
 @pytest.mark.parametrize(

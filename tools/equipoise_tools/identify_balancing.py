@@ -51,7 +51,7 @@ def identify(published: Planar, log: Motion) -> Identification:
     axes = len(log.theta)
     names = [*FITTED, *(f"offset_{'xy'[i]}" for i in range(axes))]
     scale = np.array([*FITTED.values(), *[0.02] * axes])
-    begin = states(log, HORIZON, (SMOOTH, SMOOTH), 2)
+    begin = states(log, HORIZON, SMOOTH, 2)
     blocks = [(s.at * STEP_S // BLOCK_S).astype(int) for s in begin]
     whole = np.unique(np.concatenate(blocks))
     if len(whole) < LEAST_BLOCKS:

@@ -9,10 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid  # type: ignore[import-untyped]
 
 STEP_S = 0.005
 STICKS_RAD_S = 0.1  # below it Coulomb friction falls to zero: rest is not modelled
 GRAVITY = 9.81
+PAST = 6  # steps of the past that tell a rate: three rows at 100 Hz
 
 
 @dataclass(frozen=True)
@@ -33,30 +35,28 @@ class Planar:
     delay_s: float = 0.0
     offset: float = 0.0  # of the logged tilt
 
-    def predict(self, theta, theta_dot, phi, phi_dot, u):
-        """Ahead by len(u) steps from arrays of states; u: steps x states."""
+    def accelerations(self, theta, phi_dot, drive):
+        """Of theta and phi."""
         rolls = self.rolling_inertia + (self.rolling_mass + self.body_mass) * self.radius**2
         arm = self.body_mass * self.radius * self.height
         m11, m12 = rolls + self.rotor, rolls + arm
         m22 = rolls + 2 * arm + self.body_inertia + self.body_mass * self.height**2
         determinant = m11 * m22 - m12**2
-        weight = self.body_mass * GRAVITY * self.height
-        theta = theta - self.offset
+        fall = self.body_mass * GRAVITY * self.height * (theta - self.offset)
+        friction = self.coulomb * np.tanh(phi_dot / STICKS_RAD_S) + self.viscous * phi_dot
+        torque = self.k1 * drive - self.k2 * phi_dot - friction
+        return (m11 * fall - m12 * torque) / determinant, (m22 * torque - m12 * fall) / determinant
 
-        def change(part, theta, phi_dot, drive):
-            """What the rates change by in a part of a step."""
-            friction = self.coulomb * np.tanh(phi_dot / STICKS_RAD_S) + self.viscous * phi_dot
-            torque, fall = self.k1 * drive - self.k2 * phi_dot - friction, weight * theta
-            step = part * STEP_S / determinant
-            return step * (m11 * fall - m12 * torque), step * (m22 * torque - m12 * fall)
-
+    def predict(self, theta, theta_dot, phi, phi_dot, u):
+        """Ahead by len(u) steps from arrays of states; u: steps x states."""
+        half = 0.5 * STEP_S
         for drive in u:  # the midpoint rule
-            a, b = change(0.5, theta, phi_dot, drive)
-            middle = theta + 0.5 * STEP_S * theta_dot, theta_dot + a, phi_dot + b
+            a, b = self.accelerations(theta, phi_dot, drive)
+            middle = theta + half * theta_dot, theta_dot + half * a, phi_dot + half * b
             theta, phi = theta + STEP_S * middle[1], phi + STEP_S * middle[2]
-            a, b = change(1.0, middle[0], middle[2], drive)
-            theta_dot, phi_dot = theta_dot + a, phi_dot + b
-        return theta + self.offset, phi
+            a, b = self.accelerations(middle[0], middle[2], drive)
+            theta_dot, phi_dot = theta_dot + STEP_S * a, phi_dot + STEP_S * b
+        return theta, phi
 
 
 def of_configuration(config: dict) -> Planar:
@@ -89,12 +89,12 @@ class Motion:
         return replace(self, used=self.used & used)
 
 
-def polynomial(values: np.ndarray, before: int, after: int) -> tuple[np.ndarray, np.ndarray]:
-    """Value and rate at each step of the parabola through its past, of the cubic through past and future."""
+def fitted(values: np.ndarray, before: int, after: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Value and rate at each step of the polynomial through the steps around it."""
     k = np.arange(-before, after + 1)
-    fit = np.linalg.pinv(np.vander(k, 4 if after else 3, increasing=True))
-    padded = np.pad(values, ((0, 0), (before, after)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(k), axis=1)
+    fit = np.linalg.pinv(np.vander(k, degree + 1, increasing=True))
+    padded = np.pad(values, (before, after), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(k))
     return windows @ fit[0], windows @ fit[1] / STEP_S
 
 
@@ -120,31 +120,42 @@ class Start:
     phi_dot: np.ndarray
 
 
-def states(motion: Motion, steps: int, window: tuple[int, int], every: int) -> list[Start]:
+def states(motion: Motion, steps: int, around: int, every: int) -> list[Start]:
     at = starts(motion, steps, every)
-    theta, theta_dot = polynomial(motion.theta, *window)
-    phi, phi_dot = polynomial(motion.phi, *window)
-    return [Start(at, *(x[axis, at] for x in (theta, theta_dot, phi, phi_dot))) for axis in range(len(theta))]
+    axes = range(len(motion.theta))
+    cubics = [[fitted(x[i], around, around, 3) for x in (motion.theta, motion.phi)] for i in axes]
+    return [Start(at, *(x[at] for pair in both for x in pair)) for both in cubics]
+
+
+def latest(p: Planar, theta: np.ndarray, phi: np.ndarray, u: np.ndarray) -> list[np.ndarray]:
+    """Theta, phi and their rates at each step: straight lines through what the model leaves of the past."""
+    drive = driven(u, np.arange(len(u)), 1, p.delay_s)[0]
+    out = []
+    accelerations = p.accelerations(theta, fitted(phi, PAST, 0, 1)[1], drive)
+    for values, acceleration in zip((theta, phi), accelerations, strict=True):
+        rate = cumulative_trapezoid(acceleration, dx=STEP_S, initial=0.0)
+        known = cumulative_trapezoid(rate, dx=STEP_S, initial=0.0)
+        value, slope = fitted(values - known, PAST, 0, 1)
+        out += [value + known, slope + rate]
+    return out
 
 
 def ahead(model: list[Planar], motion: Motion, horizon_s: float = 0.1) -> dict[str, dict[str, float]]:
     """RMS of what each prediction from past samples alone is wrong by, rad: tilt and wheels (or ball)."""
     steps = round(horizon_s / STEP_S)
     errors: dict[str, list[np.ndarray]] = {}
-    for axis, s in enumerate(states(motion, steps, (20, 0), 1)):
-        p = model[axis]
-        then = motion.theta[axis, s.at + steps], motion.phi[axis, s.at + steps]
-        t = steps * STEP_S
+    at = starts(motion, steps, 1)
+    for p, theta, phi, u in zip(model, motion.theta, motion.phi, motion.u, strict=True):
+        now = [x[at] for x in latest(p, theta, phi, u)]
+        lines = [fitted(x, PAST, 0, 1) for x in (theta, phi)]
         guesses = {
-            "model": p.predict(
-                s.theta, s.theta_dot, s.phi, s.phi_dot, driven(motion.u[axis], s.at, steps, p.delay_s)
-            ),
-            "persistence": (motion.theta[axis, s.at], motion.phi[axis, s.at]),
-            "constant_rate": (s.theta + t * s.theta_dot, s.phi + t * s.phi_dot),
+            "model": p.predict(*now, driven(u, at, steps, p.delay_s)),
+            "persistence": (theta[at], phi[at]),
+            "constant_rate": [value[at] + steps * STEP_S * rate[at] for value, rate in lines],
         }
         for name, guess in guesses.items():
-            for what, g, true in zip(("tilt", "wheel"), guess, then, strict=True):
-                errors.setdefault(f"{name} {what}", []).append(g - true)
+            for what, g, true in zip(("tilt", "wheel"), guess, (theta, phi), strict=True):
+                errors.setdefault(f"{name} {what}", []).append(g - true[at + steps])
     rms = {k: float(np.sqrt(np.mean(np.square(np.concatenate(v))))) for k, v in errors.items()}
     return {
         n: {w: rms[f"{n} {w}"] for w in ("tilt", "wheel")} for n in ("model", "persistence", "constant_rate")
