@@ -34,7 +34,7 @@ std::vector<int> read_indices(Section& s, const std::string& key, std::size_t co
   return indices;
 }
 
-CalibrationFile read(const Document& document) {
+CalibrationFile read_document(const Document& document) {
   Section root(document, document.root(), "");
   CalibrationFile file;
   const int version = root.integer("version", 1, 1000000);
@@ -96,7 +96,7 @@ CalibrationFile::Stamp stamp_of(double temperature_degC) {
 }
 
 CalibrationFile parse_calibration(const std::string& text, const std::string& origin) {
-  return read(Document::parse(text, origin));
+  return read_document(Document::parse(text, origin));
 }
 
 CalibrationFile load_calibration(const std::string& path, const std::string& robot) {

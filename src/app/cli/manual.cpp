@@ -7,8 +7,6 @@
 namespace equipoise::app {
 namespace {
 
-using Command = CommandDescription;
-
 constexpr const char* kAbout =
     "Keeps a robot upright on a ball (MBBR) or on two wheels (eduMIP): on a BeagleBone, against another "
     "physics engine, or in a simulated world.";
@@ -23,7 +21,7 @@ std::string dashed(std::string text) {
   return text;
 }
 
-std::string page_name(const Command& c) {
+std::string page_name(const CommandDescription& c) {
   return c.name.empty() ? "equipoise" : "equipoise-" + dashed(c.name);
 }
 
@@ -69,14 +67,14 @@ std::string help_of(const OptionDescription& o) {
   return value ? o.help + "." : sentence(o.help);
 }
 
-std::vector<OptionDescription> sorted(const Command& c, bool positional) {
+std::vector<OptionDescription> sorted(const CommandDescription& c, bool positional) {
   std::vector<OptionDescription> chosen;
   for (const OptionDescription& o : c.options)
     if (o.positional == positional) chosen.push_back(o);
   return chosen;
 }
 
-void roff_options(std::ostringstream& out, const Command& c) {
+void roff_options(std::ostringstream& out, const CommandDescription& c) {
   for (const bool positional : {true, false}) {
     const auto options = sorted(c, positional);
     if (options.empty()) continue;
@@ -94,7 +92,7 @@ void roff_options(std::ostringstream& out, const Command& c) {
 
 }  // namespace
 
-std::string manual_page(const Command& c, const std::string& version) {
+std::string manual_page(const CommandDescription& c, const std::string& version) {
   std::ostringstream out;
   const std::string title = c.name.empty() ? "firmware and simulator of balancing robots" : c.help;
   out << ".TH " << roff(upper(page_name(c))) << " 1 \"\" \"equipoise " << version << "\" \"User Commands\"\n"
@@ -107,7 +105,7 @@ std::string manual_page(const Command& c, const std::string& version) {
   roff_options(out, c);
   if (!c.commands.empty()) {
     out << ".SH COMMANDS\n";
-    for (const Command& below : c.commands)
+    for (const CommandDescription& below : c.commands)
       out << ".TP\n.BR " << roff(page_name(below)) << " (1)\n" << roff(sentence(below.help)) << "\n";
   }
   if (!c.example.empty()) out << ".SH EXAMPLE\n.nf\n" << roff(c.example) << "\n.fi\n";
@@ -121,7 +119,7 @@ std::string manual_page(const Command& c, const std::string& version) {
   return out.str();
 }
 
-std::string reference_page(const Command& program) {
+std::string reference_page(const CommandDescription& program) {
   std::ostringstream out;
   out << "# Commands\n`equipoise COMMAND --help` says the same. Exit status: 0 success, 1 a job that failed, "
          "2 bad usage "
@@ -131,7 +129,7 @@ std::string reference_page(const Command& program) {
       text.insert(at, "\\");
     return text;
   };
-  for_each_command(program, [&](const Command& c) {
+  for_each_command(program, [&](const CommandDescription& c) {
     if (c.name.empty()) return;
     out << "\n## equipoise " << c.name << "\n" << sentence(c.help) << "\n";
     if (!c.example.empty()) out << "\n```sh\n" << c.example << "\n```\n";

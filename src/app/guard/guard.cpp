@@ -66,7 +66,7 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
 
 namespace {
 
-struct Arguments {
+struct GuardArguments {
   int heartbeat_fd = -1;
   std::string board;
   std::string enable;
@@ -78,7 +78,7 @@ struct Arguments {
   int complain_fd = STDERR_FILENO;
 };
 
-std::unique_ptr<Bridges> bridges_of(const Arguments& a) {
+std::unique_ptr<Bridges> bridges_of(const GuardArguments& a) {
   if (a.board.empty() == a.pwm.empty())
     throw InputError("guard needs either --board FILE or --pwm FILE...: what shall it switch off?");
   if (a.board.empty()) return std::make_unique<FileBridges>(a.enable, a.pwm);
@@ -91,7 +91,7 @@ bool follow(int parent) {
   return getppid() == parent;  // it may have ended before we asked
 }
 
-int run(const Arguments& a) {
+int run(const GuardArguments& a) {
   watch_interrupts();
   std::unique_ptr<Bridges> bridges;
   std::unique_ptr<runtime::SharedHeartbeat> heartbeat;
@@ -131,7 +131,7 @@ void add_guard(Subcommand app) {
   const Subcommand command =
       app.subcommand("guard", "Stops the motors when the loop is dead, stopped or hanging")
           .example("equipoise guard --heartbeat-fd 3 --board board.toml");
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<GuardArguments>();
   command.option("--heartbeat-fd", a->heartbeat_fd, "descriptor of the page on which the loop beats")
       .required();
   command.option("--board", a->board, "wiring, TOML: the bridges to hold; see config/boards").file();
