@@ -227,7 +227,9 @@ TYPED_TEST(PackedFilterTest, GivesTheLikelihoodOfTheSamplesBeforeItCorrects) {
   EXPECT_EQ(filter.x(), x);
   EXPECT_EQ(filter.P(), P);
 
-  Eigen::MatrixXd S = H * P * H.transpose();  // of no fixed size: such decompositions compile once
+  const Eigen::MatrixXd rows = H;  // of no fixed size: such products and decompositions compile once
+  const Eigen::MatrixXd Pht = Eigen::MatrixXd(P) * rows.transpose();
+  Eigen::MatrixXd S = rows * Pht;
   S.diagonal() += R;
   const Eigen::LDLT<Eigen::MatrixXd> of_used(S.topLeftCorner(kUsed, kUsed));
   const Eigen::VectorXd weighted = of_used.solve(nu.head(kUsed));
@@ -245,7 +247,7 @@ TYPED_TEST(PackedFilterTest, GivesTheLikelihoodOfTheSamplesBeforeItCorrects) {
   EXPECT_NEAR(filter.row_variance()[kUsed] / (S(kUsed, kUsed) - across.dot(of_used.solve(across))), 1.0,
               1e-9);
   filter.correct();
-  const Vec<kStates> gained = P * H.topRows(kUsed).transpose() * weighted;
+  const Eigen::VectorXd gained = Pht.leftCols(kUsed) * weighted;
   EXPECT_LT((filter.x() - x - gained).norm(), 1e-9 * gained.norm());
 }
 
