@@ -116,15 +116,14 @@ class ShadowRun {
   /// With the mount at which accelerometer and model agree on the mean, as `calibrate` finds it on the robot.
   Shadow run() {
     Vec2 mount_rad = Vec2::Zero();
-    for (int i = 0; i < kLevellings; ++i) {
+    for (int left = kLevellings;; --left) {
       follow();
       const Vec2 off = offset_rad();
-      if (!(off.norm() > kLevel_rad)) break;
+      if (left == 0 || !(off.norm() > kLevel_rad)) break;
       mount_rad += off;
       params_.calibration.R_BS =
           Eigen::AngleAxisd(-off.norm(), Vec3(off.x(), off.y(), 0.0).normalized()) * params_.calibration.R_BS;
     }
-    follow();
     out_.mount_rad = mount_rad;
     predict();
     measure_noise();
@@ -133,7 +132,7 @@ class ShadowRun {
 
  private:
   static constexpr int kLevellings = 20;
-  static constexpr double kLevel_rad = 1e-4;
+  static constexpr double kLevel_rad = 5e-4;
   static constexpr int kBefore = 20;   // ticks that the senses need before a start, and after a fault
   static constexpr int kSettle = 100;  // ticks after a start that the tilt's error does not count
   static constexpr std::uint32_t kNotOurs = kNotRequested | kCommandStale | kOverrun | kSaturated | kStall |

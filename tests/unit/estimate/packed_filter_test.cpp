@@ -226,11 +226,9 @@ TYPED_TEST(PackedFilterTest, GivesTheLikelihoodOfTheSamplesBeforeItCorrects) {
   filter.innovate(u, expected + nu, use);
   EXPECT_EQ(filter.x(), x);
   EXPECT_EQ(filter.P(), P);
-
-  const Eigen::MatrixXd rows = H;  // of no fixed size: such products and decompositions compile once
-  const Eigen::MatrixXd Pht = Eigen::MatrixXd(P) * rows.transpose();
-  Eigen::MatrixXd S = rows * Pht;
-  S.diagonal() += R;
+  // Of no fixed size: such products and decompositions compile once.
+  const Eigen::MatrixXd Pht = Eigen::MatrixXd(P) * Eigen::MatrixXd(H).transpose();
+  const Eigen::MatrixXd S = Eigen::MatrixXd(H) * Pht + Eigen::MatrixXd(R.asDiagonal());
   const Eigen::LDLT<Eigen::MatrixXd> of_used(S.topLeftCorner(kUsed, kUsed));
   const Eigen::VectorXd weighted = of_used.solve(nu.head(kUsed));
   double product = 1.0;
