@@ -19,6 +19,7 @@ constexpr double kFirstBias = 0.1;       // rad/s, uncalibrated
 constexpr double kFirstYawBias = 0.005;  // gravity says nothing of it; taken off at rest
 constexpr double kRollingBand_Hz = 6.0;  // of the wheels' accelerations: encoders count in steps
 constexpr int kBlock = 100;              // ticks, longer than the body's vibration and sway
+constexpr double kFirst = 1.0;           // (m/s2)^2 of a sample: 0.1 m/s2 over a block
 constexpr int kPasses = 5;               // after which the blocks' variances stay
 
 Mat3 cross(const Vec3& v) {
@@ -164,6 +165,7 @@ std::vector<double> variances_of(const std::vector<Vec3>& gravity, const std::ve
     of_means += sum.squaredNorm() / (2.0 * n);
     scatter.push_back(std::max(kLeast, (squares - sum.squaredNorm() / n) / (2.0 * n)));
   }
+  if (scatter.size() < 3) return std::vector<double>(scatter.size(), kFirst);
   std::vector<double> sorted = scatter;
   const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), median, sorted.end());
@@ -177,7 +179,7 @@ std::vector<double> variances_of(const std::vector<Vec3>& gravity, const std::ve
 
 Smoothed smooth(const std::vector<SmootherSample>& samples, double radius_m, double imu_height_m) {
   const std::vector<Vec3> gravity = felt_gravity(samples, radius_m, imu_height_m);
-  std::vector<double> variance(samples.size() / kBlock + 1, 1.0);  // 0.1 m/s2 over a block of half a second
+  std::vector<double> variance(samples.size() / kBlock + 1, kFirst);
   std::vector<Smooth> smooth;
   for (int i = 0; i < kPasses; ++i) {
     smooth = pass(samples, gravity, variance);
