@@ -91,7 +91,7 @@ def test_intervals_from_a_real_ball_bot_hold_on_its_next_24_s(root):
         a, b = first["estimates"][name], second["estimates"][name]
         assert abs(a["value"] - b["value"]) < np.hypot(a["half_width_95"], b["half_width_95"]), name
         assert a["half_width_95"] < 0.4 * a["value"]
-    other = result(table=log.with_name("main_control_autotune_1.txt"))  # nothing was chosen on it
+    other = result(table=log.with_name("main_control_autotune_1.txt"))  # nothing was fitted to it
     for log in (first, other):
         for which in ("ahead_configured", "ahead_identified"):
             assert log[which]["model"]["wheel"] < 0.4 * log[which]["constant_rate"]["wheel"]
