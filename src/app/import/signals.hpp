@@ -1,8 +1,10 @@
-// Series of one value per tick: filters and sums that the checks of an import need. Not RT-safe.
+// Series of one value per tick: filters and sums that the checks of an import need; a median. Not RT-safe.
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "equipoise/types.hpp"
 
@@ -12,6 +14,12 @@ using Series = Eigen::ArrayXd;
 
 inline constexpr double kLow_Hz = 0.5;  // balancing moves in this band: below it biases, above it vibration
 inline constexpr double kHigh_Hz = 5.0;
+
+inline double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 /// First-order low-pass.
 inline Series smooth(Series x, double hz) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/import/signals.hpp"
 #include "app/text/format.hpp"
 
 namespace equipoise::app {
@@ -12,12 +13,6 @@ namespace {
 constexpr double kNearUnit = 0.2;  // as close to a factor of units is a mistake of units
 
 }  // namespace
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::string units_mistake(double scale, const std::vector<std::pair<double, const char*>>& known) {
   for (const auto& [factor, what] : known)

@@ -10,7 +10,6 @@
 
 namespace equipoise::app {
 
-double median(std::vector<double> values);
 /// Which mistake of units makes a factor of `scale`; empty: none that is known.
 std::string units_mistake(double scale, const std::vector<std::pair<double, const char*>>& known);
 

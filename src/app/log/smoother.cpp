@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/import/signals.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 
 namespace equipoise::app {
@@ -166,11 +167,9 @@ std::vector<double> variances_of(const std::vector<Vec3>& gravity, const std::ve
     scatter.push_back(std::max(kLeast, (squares - sum.squaredNorm() / n) / (2.0 * n)));
   }
   if (scatter.size() < 3) return std::vector<double>(scatter.size(), kFirst);
-  std::vector<double> sorted = scatter;
-  const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), median, sorted.end());
+  const double usual = median(scatter);
   double times = 0.0;
-  for (double& each : scatter) times += each = std::max(1.0, each / *median);
+  for (double& each : scatter) times += each = std::max(1.0, each / usual);
   for (double& each : scatter) each *= std::max(kLeast, of_means / times);
   return scatter;
 }
