@@ -126,6 +126,21 @@ def test_a_mistake_in_the_map_is_named(root, table, tmp_path, changes, check, na
     assert named in out["by_name"][check]["text"]
 
 
+def test_a_loop_per_wheel_does_not_make_wheels_that_never_turn_look_swapped(root, table, tmp_path):
+    looped = pd.read_csv(table)
+    scatter = 0.02 * np.sin(20 * looped.t)  # of the encoders, which their loops answer
+    rate = np.gradient(scatter, looped.t)
+    both, drive = 0.5 * (looped.e0 + looped.e1), 0.5 * (looped.d0 + looped.d1)
+    looped["e0"], looped["e1"] = both + scatter, both - scatter
+    looped["d0"], looped["d1"] = drive - 0.02 * rate, drive + 0.02 * rate
+    looped["gy"] = 0.0
+    looped.to_csv(tmp_path / "looped.csv", index=False)
+    out = checks(tmp_path / "looped.csv", write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
+    assert out["by_name"]["drive_wheels_turn"]["value"] < 0
+    assert "drive_wheels_turn" not in out["checks_failed"]
+    assert "does not tell" in out["by_name"]["drive_wheels_turn"]["text"]
+
+
 def test_shadow_of_a_healthy_run_is_quiet_and_of_a_dead_gyro_axis_is_not(root, table, tmp_path):
     out = checks(table, write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
     healthy = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
