@@ -92,7 +92,7 @@ static int write_memory(const i2c_dev_t* i2c, uint16_t address, const uint8_t* d
 
 static int verify_memory(const i2c_dev_t* i2c, uint16_t address, const uint8_t* data, uint8_t length) {
   const uint8_t bank[2] = {(uint8_t)(address >> 8), (uint8_t)address};
-  uint8_t kept[DMP_CHUNK];
+  uint8_t kept[DMP_CHUNK] = {0};
   int status = i2c_dev_write(i2c, MPU9250_DMP_BANK, bank, 2);
   if (status == 0) status = i2c_dev_read(i2c, MPU9250_DMP_DATA, kept, length);
   if (status < 0) return status;

@@ -27,9 +27,9 @@ int sysfs_read_text(const char* dir, const char* attribute, char* out, size_t si
   const int fd = sysfs_open(dir, attribute, O_RDONLY);
   if (fd < 0) return fd;
   const ssize_t n = pread(fd, out, size - 1, 0);
-  const int status = n < 0 ? -errno : 0;
+  const int error = errno;
   close(fd);
-  if (status < 0) return status;
+  if (n < 0) return -error;
   out[n] = '\0';
   out[strcspn(out, "\n")] = '\0';
   return 0;

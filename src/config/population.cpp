@@ -147,7 +147,7 @@ std::vector<std::string> with_robot_drawn(const std::vector<Drawn>& drawn, const
       if (list) setting += i == 0 ? "[" : ", ";
       setting += exact(d.values[i]);
     }
-    if (list) setting += "]";
+    if (list) setting += ']';
     all.push_back(std::move(setting));
   }
   all.insert(all.end(), overrides.begin(), overrides.end());

@@ -102,6 +102,7 @@ std::vector<Section> Section::tables(const std::string& key, std::size_t min, st
                   std::to_string(max));
   }
   std::vector<Section> sections;
+  sections.reserve(array->size());
   for (std::size_t i = 0; i < array->size(); ++i) {
     sections.emplace_back(document_, *array->get_as<toml::table>(i),
                           full_name(key) + "[" + std::to_string(i) + "]");

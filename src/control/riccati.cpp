@@ -17,7 +17,7 @@ CMatrix solve(const CMatrix& a, const CMatrix& b) { return a.partialPivLu().solv
 CMatrix exponential(const CMatrix& M) {
   const double norm = M.cwiseAbs().rowwise().sum().maxCoeff();
   int squarings = 0;
-  for (double n = norm; n > 0.5 && squarings < 64; n *= 0.5) ++squarings;
+  while (std::ldexp(norm, -squarings) > 0.5 && squarings < 64) ++squarings;
   const CMatrix scaled = M * std::ldexp(1.0, -squarings);
   CMatrix sum = CMatrix::Identity(M.rows(), M.cols());
   CMatrix term = sum;

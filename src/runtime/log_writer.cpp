@@ -154,13 +154,14 @@ void LogWriter::close() {
     sync_stop_.store(true, std::memory_order_relaxed);
     syncer_.join();
   }
-  if (fd_ < 0) return;
+  const int fd = fd_;
+  if (fd < 0) return;
   write_out();
-  if (limits_.sync && fdatasync(fd_) != 0) fail(errno);
+  if (limits_.sync && fdatasync(fd) != 0) fail(errno);
   struct stat status {};
-  if (error_.empty() && fstat(fd_, &status) == 0 && status.st_nlink == 0)
+  if (error_.empty() && fstat(fd, &status) == 0 && status.st_nlink == 0)
     error_ = files_.back() + ": the log was deleted while it was written";
-  ::close(fd_);
+  ::close(fd);
   fd_ = -1;
 }
 

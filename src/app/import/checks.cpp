@@ -78,6 +78,7 @@ struct Grid {
     const double freedom = std::max(independent - static_cast<double>(x.size()), 1.0);
     const double variance = (Y - X * c).squaredNorm() / freedom;
     std::vector<Coefficient> out;
+    out.reserve(x.size());
     for (Eigen::Index i = 0; i < c.size(); ++i) out.push_back({c(i), std::sqrt(variance * inverse(i, i))});
     return out;
   }
@@ -241,6 +242,7 @@ void check_order(const Grid& g, const ImportedRobot& robot, std::vector<Check>* 
 /// A balancing robot's z points up.
 Check check_up(const Grid& g, const ImportMap& map) {
   std::vector<double> up;
+  up.reserve(g.used.size());
   for (const Eigen::Index k : g.used) up.push_back(g.accel(k, 2));
   Check c{"accel_up", std::nullopt, kNotGiven, "no balancing stretch"};
   if (up.empty()) return c;

@@ -97,7 +97,7 @@ bool learn_action(Port& port, HandAction action, double wait_s, std::vector<Fram
   }
   std::fprintf(stderr, "  %s%s%s\n", to_hex(learnt.frame).c_str(),
                learnt.released.empty() ? "" : ", released: ", to_hex(learnt.released).c_str());
-  *frames = with;
+  *frames = std::move(with);
   return true;
 }
 

@@ -60,7 +60,7 @@ int run_simulated(const RunArguments& a, const RobotType& robot) {
                                a.choice.fidelity, a.set),
       "");
   std::vector<PlannedFault> faults;
-  for (const std::string& text : a.faults) faults.push_back(planned_fault(text));
+  std::transform(a.faults.begin(), a.faults.end(), std::back_inserter(faults), planned_fault);
   const auto world = runner.robot().world(a.choice, a.seed);
   PlantBackend simulated(*world);
   PracticeBackend practice(simulated.io(), a.speed, faults, a.seed);

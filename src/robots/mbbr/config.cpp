@@ -192,7 +192,7 @@ Loaded<MbbrConfig> read_mbbr(const Document& document) {
   config::read_surroundings(
       root, c.robot.l_a,
       [&c](Section world, std::size_t level) {
-        c.world[level] = read_mbbr_world(world, &c.world_bridge[level]);
+        c.world[level] = read_mbbr_world(std::move(world), &c.world_bridge[level]);
       },
       &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;

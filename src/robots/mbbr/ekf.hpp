@@ -116,7 +116,7 @@ class MbbrEkf {
   void doubt_bias(double sigma_rad_s) noexcept { filter_.widen(Model::kBiasX, 2, sigma_rad_s * sigma_rad_s); }
 
   /// What start() takes of a tilt.
-  static const Vec2& lean(const Vec2& tilt_rad) noexcept { return tilt_rad; }
+  static Vec2 lean(const Vec2& tilt_rad) noexcept { return tilt_rad; }
   /// Of u, as estimated.
   Vec3 disturbance() const noexcept { return filter_.x().segment<3>(Model::kDisturbance); }
   const Vec<18>& x() const noexcept { return filter_.x(); }

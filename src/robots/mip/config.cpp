@@ -170,7 +170,7 @@ Loaded<MipConfig> read_mip(const Document& document) {
   config::read_surroundings(
       root, c.robot.l_a,
       [&c](Section world, std::size_t level) {
-        c.world[level] = read_mip_world(world, &c.world_bridge[level]);
+        c.world[level] = read_mip_world(std::move(world), &c.world_bridge[level]);
       },
       &c);
   c.estimators.ekf.sensor_age_s = c.chain.gyro_delay_s;

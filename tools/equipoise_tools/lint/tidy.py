@@ -7,8 +7,8 @@ import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +16,13 @@ from pathlib import Path
 from .law import includes
 from .tree import Finding, Tree
 
-TOOL = "clang-tidy-14"
-# The analyzer does not step into templates: in Eigen it finds nothing and triples its time.
+TOOL = Path(sys.executable).with_name("clang-tidy")  # of tools/requirements.txt
+# The analyzer does not step into templates: in Eigen it finds nothing and triples its time. A dozen functions that build
+# strings have more paths than any budget: theirs is the one that the analyzer's shallow mode has.
 ANALYZER = [
     f"--extra-arg={word}"
-    for word in ("-Xclang", "-analyzer-config", "-Xclang", "c++-template-inlining=false")
+    for option in ("c++-template-inlining=false", "max-nodes=75000")
+    for word in ("-Xclang", "-analyzer-config", "-Xclang", option)
 ]
 _DIAGNOSTIC = re.compile(r"^(?P<path>/[^:\n]+):(?P<line>\d+):\d+: (?:warning|error): (?P<message>.*)$", re.M)
 
@@ -123,14 +125,14 @@ def run(job: Job, root: Path, database: Path) -> list[Finding]:
         findings.append(Finding(os.path.relpath(path, root), line, match["message"]))
     if result.returncode != 0 and not findings:
         said = (result.stderr or result.stdout).strip()[-500:]
-        findings.append(Finding(os.path.relpath(job.file, root), 0, f"{TOOL} failed: {said}"))
+        findings.append(Finding(os.path.relpath(job.file, root), 0, f"{TOOL.name} failed: {said}"))
     return findings
 
 
 def clang_tidy(tree: Tree, build: Path | None = None, jobs: int | None = None) -> list[Finding]:
     build = build or tree.root / "build" / "host"
-    if shutil.which(TOOL) is None:
-        return [Finding(TOOL, 0, "is not installed; ./tools/test installs it")]
+    if not TOOL.is_file():
+        return [Finding(TOOL.name, 0, "is not installed; ./tools/test installs it")]
     if not (build / "compile_commands.json").is_file():
         return [Finding(str(build), 0, "has no compile_commands.json; configure first: cmake --preset host")]
     cache = build / "tidy"
