@@ -125,12 +125,14 @@ struct Lie {
 /// axis that got impossible took the evidence along, or the lie was examined as a jump of the bias. And
 /// beside an encoder that was left out, a second one stood still while the third wheel rolled away. An
 /// eduMIP without its yaw rate left out a wheel on trial, too; an MBBR whose wheels were all held by friction
-/// took one of them for stuck, while it fell over the axis that the gyro reported as its spin.
+/// took one of them for stuck, while it fell over the axis that the gyro reported as its spin. A
+/// flipped gyro drove the robot away while its verdict waited.
 TEST(NotFooled, BySensorsThatLie) {
   const std::vector<Lie> lies{{"edumip", "gyro_z_flipped", "slc", "spinning", {57, 59, 106}},
                               {"edumip", "gyro_z_flipped", "slc", "spin_driving", {17, 32, 92}},
                               {"edumip", "gyro_zx_swapped", "lqr", "spin_driving", {56, 202}},
                               {"edumip", "gyro_x_flipped", "lqr", "spin_driving", {77, 258, 283}},
+                              {"edumip", "gyro_x_flipped", "slc", "driving", {2103, 2107, 2115, 2126}},
                               {"edumip", "gyro_y_zero", "slc", "spin_driving", {15039}},
                               {"mbbr", "gyro_yz_swapped", "scheduled", "balancing", {16191, 16206, 16225}},
                               {"mbbr", "gyro_zx_swapped", "scheduled", "balancing", {16169, 16268}},

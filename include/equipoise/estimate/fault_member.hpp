@@ -46,6 +46,7 @@ struct FaultMember {
 
   static constexpr double kNoise_rad_s = 0.15;  // of an IMU that shakes: real robots that roll reach 0.1
   static constexpr double kNoise_m_s2 = 3.0;    // and 3
+  static constexpr double kTooFar_rad = 0.3;    // that a robot tilts: half its limit
 
   Filter filter;
   bool owes = false;   // its correction, which a refuted hypothesis never needs
@@ -66,6 +67,11 @@ struct FaultMember {
   Filter& settled() noexcept {
     if (std::exchange(owes, false)) filter.correct();
     return filter;
+  }
+  /// If it is true, the body tilts too far within `ticks`, unknown to a control that believes in such rates.
+  bool is_urgent(const Vec3& believed_rad_s, int ticks) noexcept {
+    const Vec3 unseen = body_rates(settled().estimate()) - believed_rad_s;
+    return ticks * kTickS * unseen.template head<2>().norm() > kTooFar_rad;
   }
   /// What is used goes on from elsewhere, which explains `nats` of what this does.
   void depart(double nats, double least) noexcept {

@@ -78,7 +78,7 @@ class SensorFaults {
     if (stale_) begin_all();
     advance_all(u, z);
     weigh_.hear(z);
-    decide(control);
+    decide(control, expected_rad_s);
     if (kRocks && trusted_) watch_roll(control, expected_rad_s);
   }
 
@@ -300,7 +300,7 @@ class SensorFaults {
     return m.ratio + (h.healthy() && ticks_ - event_at_ > kEventTicks ? kEventPrior : 0.0);
   }
 
-  void decide(Filter& control) noexcept {
+  void decide(Filter& control, const Vec3& believed_rad_s) noexcept {
     std::array<double, kCount> weight;
     for (std::size_t i = 0; i < kCount; ++i) weight[i] = weighed(i);
     const auto best =
@@ -318,18 +318,18 @@ class SensorFaults {
     const auto told = [&](std::size_t i) { return std::min(weight[i], members_[i].ratio); };
     evidence_ = {kRows[best], told(best),        kBound, next, next < 0 ? 0.0 : told(runner_up),
                  false,       evidence_.verdicts};
-    leads_for_ = best == leader_ && weight[best] > kBound ? leads_for_ + 1 : 0;
+    const bool tells = weight[best] > kBound;
+    leads_for_ = best == leader_ && tells ? leads_for_ + 1 : 0;
     leader_ = best;
-    if (!(weight[best] > kBound)) {
-      undecided_ = 0;
-      return;
-    }
+    undecided_ = tells ? undecided_ : 0;
+    if (!tells) return;
     if (leads == kNone) return happened(best, control);
     if (weight[best] - second < kMargin) {
       if (!kHypotheses[runner_up].healthy() && ++undecided_ > kPatience) stop(best, runner_up);
       return;
     }
-    if (kHypotheses[best].lasts(leads == kStop) && leads_for_ < kPatience) return;
+    const bool waits = kHypotheses[best].lasts(leads == kStop) && leads_for_ < kPatience;
+    if (waits && !members_[best].is_urgent(believed_rad_s, kPatience)) return;
     if (leads == kStop) return stop(best, best);
     use(best);
     control.adopt(healthy_);

@@ -104,6 +104,7 @@ inline Vec2 ball_rate(double r, const Vec2& velocity) noexcept {
 
 /// Body rates from Euler angles and their rates, [T] (A.13), and back.
 Vec3 body_rates(const Vec2& theta_xy, const Vec3& theta_dot) noexcept;
+inline Vec3 body_rates(const MbbrEstimate& x) noexcept { return x.omega_B; }
 Vec3 euler_rates(const Vec2& theta_xy, const Vec3& omega_B) noexcept;
 
 struct Mbbr {
