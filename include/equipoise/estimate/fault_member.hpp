@@ -68,10 +68,11 @@ struct FaultMember {
     if (std::exchange(owes, false)) filter.correct();
     return filter;
   }
-  /// If it is true, the body tilts too far within `ticks`, unknown to a control that believes in such rates.
+  /// If it is true, the body tilts by too much within `ticks` more than a control believes.
   bool is_urgent(const Vec3& believed_rad_s, int ticks) noexcept {
-    const Vec3 unseen = body_rates(settled().estimate()) - believed_rad_s;
-    return ticks * kTickS * unseen.template head<2>().norm() > kTooFar_rad;
+    const Vec3 turns_rad_s = body_rates(settled().estimate());
+    const double unseen_rad_s = turns_rad_s.head<2>().norm() - believed_rad_s.head<2>().norm();
+    return ticks * kTickS * unseen_rad_s > kTooFar_rad;
   }
   /// What is used goes on from elsewhere, which explains `nats` of what this does.
   void depart(double nats, double least) noexcept {
