@@ -17,8 +17,8 @@ from .law import includes
 from .tree import Finding, Tree
 
 TOOL = Path(sys.executable).with_name("clang-tidy")  # of tools/requirements.txt
-# The analyzer does not step into templates: in Eigen it finds nothing and triples its time. A dozen functions that build
-# strings have more paths than any budget: theirs is the one that the analyzer's shallow mode has.
+# The analyzer does not step into templates: in Eigen it finds nothing and triples its time. A dozen functions
+# that build strings have more paths than any budget: theirs is that of the analyzer's shallow mode.
 ANALYZER = [
     f"--extra-arg={word}"
     for option in ("c++-template-inlining=false", "max-nodes=75000")
