@@ -19,7 +19,7 @@ from .tree import Finding, Tree
 TOOL = Path(sys.executable).with_name("clang-tidy")  # of tools/requirements.txt
 # The analyzer does not step into templates: in Eigen it finds nothing and triples its time. A dozen functions
 # that build strings have more paths than any budget: theirs is that of the analyzer's shallow mode.
-ANALYZER = [
+ANALYZER = ["--extra-arg=-Qunused-arguments"] + [  # the compiler's own, of GCC
     f"--extra-arg={word}"
     for option in ("c++-template-inlining=false", "max-nodes=75000")
     for word in ("-Xclang", "-analyzer-config", "-Xclang", option)
