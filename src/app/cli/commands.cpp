@@ -3,32 +3,13 @@
 namespace equipoise::app {
 
 void add_commands(Subcommand app) {
-  add_sim(app);
-  add_run(app);
-  add_replay(app);
-  add_import(app);
-  add_convert(app);
-  add_keygen(app);
-  add_send(app);
-  add_remote(app);
-  add_model(app);
-  add_bridge(app);
-  add_geometry(app);
-  add_config(app);
-  add_design(app);
-  add_attitude(app);
-  add_motor_bench(app);
-  add_friction_rig(app);
-  add_identify(app);
-  add_bench(app);
-  add_campaign(app);
-  add_trials(app);
-  add_guard(app);
-  add_doctor(app);
-  add_calibrate(app);
-  add_bringup(app);
-  add_completion(app);
-  add_man(app);
+  for (AddCommand* add :
+       {add_sim,        add_run,      add_replay,      add_import,       add_convert,   add_keygen,
+        add_send,       add_remote,   add_model,       add_bridge,       add_geometry,  add_config,
+        add_design,     add_attitude, add_motor_bench, add_friction_rig, add_identify,  add_bench,
+        add_campaign,   add_trials,   add_guard,       add_doctor,       add_calibrate, add_bringup,
+        add_completion, add_man})
+    add(app);
 }
 
 }  // namespace equipoise::app

@@ -8,31 +8,10 @@ namespace equipoise::app {
 
 void add_commands(Subcommand app);
 
-void add_sim(Subcommand app);
-void add_run(Subcommand app);
-void add_convert(Subcommand app);
-void add_keygen(Subcommand app);
-void add_send(Subcommand app);
-void add_remote(Subcommand app);
-void add_replay(Subcommand app);
-void add_import(Subcommand app);
-void add_model(Subcommand app);
-void add_bridge(Subcommand app);
-void add_geometry(Subcommand app);
-void add_config(Subcommand app);
-void add_design(Subcommand app);
-void add_attitude(Subcommand app);
-void add_motor_bench(Subcommand app);
-void add_friction_rig(Subcommand app);
-void add_identify(Subcommand app);
-void add_bench(Subcommand app);
-void add_campaign(Subcommand app);
-void add_trials(Subcommand app);
-void add_guard(Subcommand app);
-void add_doctor(Subcommand app);
-void add_calibrate(Subcommand app);
-void add_bringup(Subcommand app);
-void add_completion(Subcommand app);
-void add_man(Subcommand app);
+using AddCommand = void(Subcommand app);
+AddCommand add_sim, add_run, add_replay, add_import, add_convert, add_keygen, add_send, add_remote, add_model,
+    add_bridge, add_geometry, add_config, add_design, add_attitude, add_motor_bench, add_friction_rig,
+    add_identify, add_bench, add_campaign, add_trials, add_guard, add_doctor, add_calibrate, add_bringup,
+    add_completion, add_man;
 
 }  // namespace equipoise::app
