@@ -13,9 +13,6 @@
 namespace equipoise::app {
 namespace {
 
-CLI::Option* option_of(void* impl) { return static_cast<CLI::Option*>(impl); }
-CLI::App* app_of(void* impl) { return static_cast<CLI::App*>(impl); }
-
 /// Whole text as a T that is finite and fits; the reason why not otherwise.
 template <class T>
 std::string number_error(const std::string& text) {
@@ -136,49 +133,27 @@ Mistake mistake_in(const CLI::App& root, int argc, char** argv) {
 
 }  // namespace
 
-Option Option::required() const {
-  option_of(impl_)->required();
-  return *this;
-}
-Option Option::show_default() const {
-  option_of(impl_)->capture_default_str();
-  return *this;
-}
-Option Option::range(double low, double high) const {
-  option_of(impl_)->check(CLI::Range(low, high));
-  return *this;
-}
+Option Option::required() const { return Option(impl_->required()); }
+Option Option::show_default() const { return Option(impl_->capture_default_str()); }
+Option Option::range(double low, double high) const { return Option(impl_->check(CLI::Range(low, high))); }
 Option Option::one_of(const std::vector<std::string>& names) const {
-  option_of(impl_)->check(CLI::IsMember(names));
-  return *this;
+  return Option(impl_->check(CLI::IsMember(names)));
 }
-Option Option::excludes(const Option& other) const {
-  option_of(impl_)->excludes(option_of(other.impl_));
-  return *this;
-}
-Option Option::needs(const Option& other) const {
-  option_of(impl_)->needs(option_of(other.impl_));
-  return *this;
-}
-Option Option::count(int values) const {
-  option_of(impl_)->expected(values);
-  return *this;
-}
-Option Option::file() const {
-  option_of(impl_)->type_name(kFileType);
-  return *this;
-}
-bool Option::given() const { return option_of(impl_)->count() > 0; }
+Option Option::excludes(const Option& other) const { return Option(impl_->excludes(other.impl_)); }
+Option Option::needs(const Option& other) const { return Option(impl_->needs(other.impl_)); }
+Option Option::count(int values) const { return Option(impl_->expected(values)); }
+Option Option::file() const { return Option(impl_->type_name(kFileType)); }
+bool Option::given() const { return impl_->count() > 0; }
 
 Subcommand Subcommand::subcommand(const std::string& name, const std::string& help) const {
-  return {app_of(impl_)->add_subcommand(name, help), status_};
+  return {impl_->add_subcommand(name, help), status_};
 }
-void Subcommand::require_subcommand() const { app_of(impl_)->require_subcommand(1); }
+void Subcommand::require_subcommand() const { impl_->require_subcommand(1); }
 
 Option Subcommand::option(const std::string& name, Value value, const std::string& help) const {
   const auto add = [&](auto reference) {
     using T = typename decltype(reference)::type;
-    CLI::Option* option = app_of(impl_)->add_option(name, reference.get(), help);
+    CLI::Option* option = impl_->add_option(name, reference.get(), help);
     if constexpr (std::is_same_v<T, std::string>) {
       if (name == "--json") checked(option, json_output_error);  // before the job
       if (name == "--telemetry" || name == "--command-url" || name == "--url") checked(option, url_error);
@@ -192,15 +167,15 @@ Option Subcommand::option(const std::string& name, Value value, const std::strin
   return std::visit(add, value);
 }
 Option Subcommand::flag(const std::string& name, bool& value, const std::string& help) const {
-  return Option(app_of(impl_)->add_flag(name, value, help));
+  return Option(impl_->add_flag(name, value, help));
 }
 Subcommand Subcommand::example(const std::string& line) const {
-  app_of(impl_)->footer(kExample + line);
+  impl_->footer(kExample + line);
   return *this;
 }
-CommandDescription Subcommand::describe() const { return described(*app_of(impl_), ""); }
+CommandDescription Subcommand::describe() const { return described(*impl_, ""); }
 void Subcommand::action(std::function<int()> run) const {
-  app_of(impl_)->callback([run = std::move(run), status = status_] { *status = run(); });
+  impl_->callback([run = std::move(run), status = status_] { *status = run(); });
 }
 
 struct CommandLine::Impl {

@@ -13,6 +13,11 @@
 #include "app/cli/description.hpp"
 #include "equipoise/no_copy.hpp"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace equipoise::app {
 
 /// A handle: copies name the same option.
@@ -30,8 +35,8 @@ class Option {
 
  private:
   friend class Subcommand;
-  explicit Option(void* impl) : impl_(impl) {}
-  void* impl_;
+  explicit Option(CLI::Option* impl) : impl_(impl) {}
+  CLI::Option* impl_;
 };
 
 /// A handle: copies name the same command. `name` of an option as "--long", "-s,--long" or, positional,
@@ -63,8 +68,8 @@ class Subcommand {
 
  private:
   friend class CommandLine;
-  Subcommand(void* impl, int* status) : impl_(impl), status_(status) {}
-  void* impl_;
+  Subcommand(CLI::App* impl, int* status) : impl_(impl), status_(status) {}
+  CLI::App* impl_;
   int* status_;
 };
 
