@@ -13,9 +13,7 @@ void write_pages(const CommandDescription& program, const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   for_each_command(program, [&](const CommandDescription& c) {
-    std::string name = c.name.empty() ? "equipoise" : "equipoise-" + c.name;
-    for (char& letter : name) letter = letter == ' ' ? '-' : letter;
-    const std::string path = folder + "/" + name + ".1";
+    const std::string path = folder + "/" + page_name(c) + ".1";
     std::ofstream file(path);
     if (!(file << manual_page(c, version()) << std::flush)) throw InputError(path + ": cannot be written");
   });

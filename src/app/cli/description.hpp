@@ -40,6 +40,8 @@ std::string completion(const std::string& shell);
 /// What the last of these words may become, a line each: the word, a tab, its help.
 std::string offers(const CommandDescription& program, const std::vector<std::string>& words);
 
+/// "equipoise-config-show", as its manual page is called.
+std::string page_name(const CommandDescription& command);
 /// Manual page of a command or, of the root, of the program: roff, section 1.
 std::string manual_page(const CommandDescription& command, const std::string& version);
 

@@ -16,15 +16,6 @@ std::string upper(std::string text) {
   return text;
 }
 
-std::string dashed(std::string text) {
-  std::replace(text.begin(), text.end(), ' ', '-');
-  return text;
-}
-
-std::string page_name(const CommandDescription& c) {
-  return c.name.empty() ? "equipoise" : "equipoise-" + dashed(c.name);
-}
-
 /// Text of a line in roff.
 std::string roff(const std::string& text) {
   std::string out;
@@ -91,6 +82,12 @@ void roff_options(std::ostringstream& out, const CommandDescription& c) {
 }
 
 }  // namespace
+
+std::string page_name(const CommandDescription& c) {
+  std::string name = c.name.empty() ? "equipoise" : "equipoise-" + c.name;
+  std::replace(name.begin(), name.end(), ' ', '-');
+  return name;
+}
 
 std::string manual_page(const CommandDescription& c, const std::string& version) {
   std::ostringstream out;
