@@ -100,6 +100,9 @@ class FaultBackend : public Backend {
   const std::atomic<bool>& log_failed() const { return log_failed_; }
   bool remote_silent() const { return is(FaultKind::kRemoteLost); }
 
+ protected:
+  int wait_tick(std::int64_t* now_ns) override;
+
  private:
   static constexpr int kGuardTicks = 3;
   static constexpr std::int64_t kClockJump_ns = 1'000'000'000;
@@ -111,7 +114,6 @@ class FaultBackend : public Backend {
   void spoil_imu(rio_sensors_t* s);
   void spoil_gyro(rio_sensors_t* s) const;
 
-  int wait_tick(std::int64_t* now_ns) override;
   int read_sensors(rio_sensors_t* out) override;
   int write_motors(const rio_motors_t& motors) override;
   int motors_off() override {

@@ -21,11 +21,11 @@ struct PlannedFault {
 /// "NAME@T" until the end, or "NAME@T+D" for D seconds; InputError says what is wrong.
 PlannedFault planned_fault(const std::string& text);
 
-class PracticeBackend : public Backend {
+class PracticeBackend : public FaultBackend {
  public:
   /// `speed`: simulated seconds in one of the wall clock.
   PracticeBackend(rio_t simulated, double speed, std::vector<PlannedFault> faults, std::uint64_t seed)
-      : broken_(simulated, seed), inner_(broken_.io()), speed_(speed), faults_(std::move(faults)) {
+      : FaultBackend(simulated, seed), speed_(speed), faults_(std::move(faults)) {
     std::sort(faults_.begin(), faults_.end(),
               [](const PlannedFault& a, const PlannedFault& b) { return a.at_s < b.at_s; });
   }
@@ -35,20 +35,15 @@ class PracticeBackend : public Backend {
     return std::any_of(faults_.begin(), faults_.end(),
                        [](const PlannedFault& f) { return f.kind == FaultKind::kLogFull; });
   }
-  const std::atomic<bool>& log_failed() const noexcept { return broken_.log_failed(); }
 
  private:
   int wait_tick(std::int64_t* now_ns) override {
     for (; next_ < faults_.size() && faults_[next_].at_s <= time_s_; ++next_)
-      broken_.start(faults_[next_].kind, faults_[next_].ticks);
-    const int status = rio_wait_tick(&inner_, now_ns);
+      start(faults_[next_].kind, faults_[next_].ticks);
+    const int status = FaultBackend::wait_tick(now_ns);
     if (status == 0) keep_pace(*now_ns);
     return status;
   }
-  int read_sensors(rio_sensors_t* out) override { return rio_read_sensors(&inner_, out); }
-  int write_motors(const rio_motors_t& motors) override { return rio_write_motors(&inner_, &motors); }
-  int motors_off() override { return rio_motors_off(&inner_); }
-  void close() override { rio_close(&inner_); }
 
   void keep_pace(std::int64_t simulated_ns) {
     constexpr std::int64_t kLost_ns = 200'000'000;  // a laptop that slept does not catch up
@@ -59,8 +54,6 @@ class PracticeBackend : public Backend {
     if (start_ns_ + due_in > now_ns) runtime::sleep_until(start_ns_ + due_in);
   }
 
-  FaultBackend broken_;
-  rio_t inner_;
   double speed_;
   std::vector<PlannedFault> faults_;
   std::size_t next_ = 0;
