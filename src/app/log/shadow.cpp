@@ -37,8 +37,6 @@ double tilt_std_rad(const Shadow& s) {
 
 }  // namespace
 
-double RootMeanSquare::value() const { return count > 0.0 ? std::sqrt(sum / count) : std::nan(""); }
-
 /// What is no number is written as null.
 nlohmann::json Shadow::json() const {
   nlohmann::json list = nlohmann::json::array();

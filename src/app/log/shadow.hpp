@@ -10,6 +10,7 @@
 
 #include "app/log/run_log.hpp"
 #include "app/text/json.hpp"
+#include "app/trial/root_mean_square.hpp"
 #include "equipoise/types.hpp"
 
 namespace equipoise::app {
@@ -19,17 +20,6 @@ struct ShadowAlarm {
   std::string hypothesis;  // names of reasons and of degraded modes
   double ratio = 0.0;      // the statistic that decided; NaN: not one number
   double bound = 0.0;
-};
-
-/// Root of a mean square, as it grows; NaN of nothing.
-struct RootMeanSquare {
-  double sum = 0.0;
-  double count = 0.0;
-  void add(double square) {
-    sum += square;
-    count += 1.0;
-  }
-  double value() const;
 };
 
 /// Errors of what is said about a moment ahead: by the model with the input that acts, by nothing changing,

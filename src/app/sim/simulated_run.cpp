@@ -6,10 +6,6 @@
 
 namespace equipoise::app {
 
-double RunMeter::Rms::value() const {
-  return count_ > 0 ? std::sqrt(sum_ / static_cast<double>(count_)) : kUncounted;
-}
-
 void RunMeter::observe(const runtime::TickRecord& t, const StateView& truth, double time_s) {
   const StateView seen = runtime::to_view(t.estimate);
   if (t.motors.enable) {
@@ -22,8 +18,8 @@ void RunMeter::observe(const runtime::TickRecord& t, const StateView& truth, dou
   if (script_.path != nullptr && time_s >= kDriveFrom_s) {
     const Vec2 path_m = script_.path->at(time_s - kDriveFrom_s).position_W_m;
     const Vec2 forward_W_m = rotate(-robot_.type->forward_rad, truth.position_W_m);
-    if (following_.empty()) path_start_W_m_ = forward_W_m - path_m;
-    following_.add((forward_W_m - path_start_W_m_ - path_m).squaredNorm(), 1);
+    if (following_.count == 0.0) path_start_W_m_ = forward_W_m - path_m;
+    following_.add((forward_W_m - path_start_W_m_ - path_m).squaredNorm());
   }
   if (time_s < kSettled_s) return;
   const StateErrors e = firmware_.errors_of(seen, truth);
@@ -34,7 +30,7 @@ void RunMeter::observe(const runtime::TickRecord& t, const StateView& truth, dou
   for (std::size_t i = 0; i < compared_.size(); ++i) {
     if (firmware_.runs(i)) compared_[i].add(firmware_.errors_of(runtime::to_view(t.others[i]), truth));
   }
-  position_.add((runtime::to_view(t.reference).position_W_m - truth.position_W_m).squaredNorm(), 1);
+  position_.add((runtime::to_view(t.reference).position_W_m - truth.position_W_m).squaredNorm());
   if (yaw_from_s_ < 0.0) {
     yaw_from_s_ = time_s;
     yaw_from_ = truth.theta_rad.z();

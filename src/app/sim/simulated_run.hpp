@@ -6,6 +6,7 @@
 
 #include "app/io/plant_backend.hpp"
 #include "app/sim/simulate.hpp"
+#include "app/trial/root_mean_square.hpp"
 #include "equipoise/no_copy.hpp"
 #include "equipoise/runtime/loop.hpp"
 #include "equipoise/runtime/supervisor.hpp"
@@ -22,29 +23,13 @@ class RunMeter {
   SimSummary summary(const Verdict& verdict, std::int64_t ticks, double wall_s) const;
 
  private:
-  class Rms {
-   public:
-    void add(double squared, int axes) {
-      sum_ += squared;
-      count_ += axes;
-    }
-    double value() const;
-    bool empty() const { return count_ == 0; }
-
-   private:
-    double sum_ = 0.0;
-    std::int64_t count_ = 0;
-  };
-  class Errors {
-   public:
+  struct Errors {
+    RootMeanSquare attitude, speed;
     void add(const StateErrors& e) {
-      attitude_.add(e.attitude_squared, e.axes);
-      speed_.add(e.speed_squared, e.axes);
+      attitude.add(e.attitude_squared, e.axes);
+      speed.add(e.speed_squared, e.axes);
     }
-    EstimatorErrors value() const { return {attitude_.value(), speed_.value()}; }
-
-   private:
-    Rms attitude_, speed_;
+    EstimatorErrors value() const { return {attitude.value(), speed.value()}; }
   };
 
   const ConfiguredRobot& robot_;
@@ -52,7 +37,7 @@ class RunMeter {
   const Script& script_;
   Errors controlling_;
   std::vector<Errors> compared_;
-  Rms position_, following_, rolling_;
+  RootMeanSquare position_, following_, rolling_;
   Vec2 path_start_W_m_ = Vec2::Zero();
   double innovation_sum_ = 0.0;
   std::int64_t innovations_ = 0;
