@@ -6,16 +6,24 @@
 namespace equipoise::app {
 namespace {
 
-/// When a sensor looked: so many ticks back, and the part of a tick after that tick.
+/// When a sensor looked: so many ticks back, and `to_sample` after that tick.
 struct Moment {
+  Moment(const Plant& plant, const SensorRow& sensor) {
+    const double ticks = std::ceil(sensor.delay_s / kTickS - 1e-9);
+    const double after = std::max(0.0, ticks * kTickS - sensor.delay_s);
+    ticks_back = static_cast<std::size_t>(ticks);
+    old_input = after <= plant.actuation_delay_s;
+    to_sample = sampled(plant.A, plant.b, after, std::min(after, plant.actuation_delay_s));
+  }
   std::size_t ticks_back;
-  double after_s;
   bool old_input;  // the torque of that moment is still that of the tick before
+  SampledSystem to_sample;
 };
-Moment moment(double delay_s, double actuation_delay_s) {
-  const double ticks = std::ceil(delay_s / kTickS - 1e-9);
-  const double after = std::max(0.0, ticks * kTickS - delay_s);
-  return {static_cast<std::size_t>(ticks), after, after <= actuation_delay_s};
+
+std::vector<Moment> moments(const Plant& plant) {
+  std::vector<Moment> out;
+  for (const SensorRow& sensor : plant.sensors) out.emplace_back(plant, sensor);
+  return out;
 }
 
 /// Runs beside a twin that gets no disturbance; its answer is the difference.
@@ -31,27 +39,20 @@ class AboutSteadySpin {
   std::unique_ptr<SettledController> disturbed_, steady_;
 };
 
-}  // namespace
-
+/// Answer of each sensor to u, tick to tick.
 std::array<std::vector<Complex>, kSensors> sensor_responses(const Plant& plant,
                                                             const std::vector<double>& omega_rad_s) {
   const Eigen::Index n = plant.A.rows();
   const SampledSystem step = sampled(plant.A, plant.b, kTickS, plant.actuation_delay_s);
   std::array<std::vector<Complex>, kSensors> out;
-  std::array<Moment, kSensors> looked;
-  std::array<SampledSystem, kSensors> to_sample;
-  for (std::size_t c = 0; c < kSensors; ++c) {
-    looked[c] = moment(plant.sensors[c].delay_s, plant.actuation_delay_s);
-    to_sample[c] =
-        sampled(plant.A, plant.b, looked[c].after_s, std::min(looked[c].after_s, plant.actuation_delay_s));
-  }
+  const std::vector<Moment> looked = moments(plant);
   for (const double w : omega_rad_s) {
     const Complex z = std::polar(1.0, w * kTickS);
     const Complex back = 1.0 / z;
     const CMatrix x =
         (z * CMatrix::Identity(n, n) - step.A).partialPivLu().solve(step.B + step.B_late * back);
     for (std::size_t c = 0; c < kSensors; ++c) {
-      const SampledSystem& s = to_sample[c];
+      const SampledSystem& s = looked[c].to_sample;
       const CMatrix x_then = s.A * x + s.B + s.B_late * back;
       const Complex y = (plant.sensors[c].C * x_then)(0, 0) +
                         plant.sensors[c].D * (looked[c].old_input ? back : Complex(1.0));
@@ -61,43 +62,57 @@ std::array<std::vector<Complex>, kSensors> sensor_responses(const Plant& plant,
   return out;
 }
 
-ClosedLoop::ClosedLoop(const Plant& plant)
-    : plant_(plant),
-      step_(sampled(plant.A, plant.b, kTickS, plant.actuation_delay_s)),
-      x_(Eigen::VectorXcd::Zero(plant.A.rows())) {
-  for (std::size_t c = 0; c < kSensors; ++c) {
-    const Moment looked = moment(plant.sensors[c].delay_s, plant.actuation_delay_s);
-    ticks_back_[c] = std::min(looked.ticks_back, kHistory - 1);
-    old_input_[c] = looked.old_input;
-    to_sample_[c] =
-        sampled(plant.A, plant.b, looked.after_s, std::min(looked.after_s, plant.actuation_delay_s));
+/// Ticks of the closed loop from a small tilt: u of the difference to the steady spin -> does it come back?
+class ClosedLoop {
+ public:
+  explicit ClosedLoop(const Plant& plant)
+      : plant_(plant),
+        step_(sampled(plant.A, plant.b, kTickS, plant.actuation_delay_s)),
+        looked_(moments(plant)),
+        x_(Eigen::VectorXcd::Zero(plant.A.rows())) {
+    for (Moment& each : looked_) each.ticks_back = std::min(each.ticks_back, kHistory - 1);
+    x_before_.fill(x_);
+    x_(plant.tilt) = 1e-4;
+    x_before_[0] = x_;
+    read();
   }
-  x_before_.fill(x_);
-  x_(plant.tilt) = 1e-4;
-  x_before_[0] = x_;
-  read();
-}
-
-void ClosedLoop::apply(Complex u) {
-  std::copy_backward(u_before_.begin(), u_before_.end() - 1, u_before_.end());
-  u_before_[0] = u;
-  x_ = step_.A * x_ + step_.B.col(0) * u + step_.B_late.col(0) * u_before_[1];
-  std::rotate(x_before_.rbegin(), x_before_.rbegin() + 1, x_before_.rend());
-  x_before_[0] = x_;
-  read();
-}
-
-/// At tick k, before its u: u_before_[0] is that of tick k - 1.
-void ClosedLoop::read() {
-  for (std::size_t c = 0; c < kSensors; ++c) {
-    const std::size_t j = ticks_back_[c];
-    const SampledSystem& s = to_sample_[c];
-    const Complex u_new = j > 0 ? u_before_[j - 1] : Complex{};  // of tick k - j
-    const Complex u_old = u_before_[j];
-    const Eigen::VectorXcd x = s.A * x_before_[j] + s.B.col(0) * u_new + s.B_late.col(0) * u_old;
-    readings_[c] = (plant_.sensors[c].C * x)(0) + plant_.sensors[c].D * (old_input_[c] ? u_old : u_new);
+  const Readings& readings() const { return readings_; }
+  void apply(Complex u) {
+    std::copy_backward(u_before_.begin(), u_before_.end() - 1, u_before_.end());
+    u_before_[0] = u;
+    x_ = step_.A * x_ + step_.B.col(0) * u + step_.B_late.col(0) * u_before_[1];
+    std::rotate(x_before_.rbegin(), x_before_.rbegin() + 1, x_before_.rend());
+    x_before_[0] = x_;
+    read();
   }
-}
+  double tilt() const { return std::abs(x_(plant_.tilt)); }
+
+ private:
+  static constexpr std::size_t kHistory = 8;
+
+  /// At tick k, before its u: u_before_[0] is that of tick k - 1.
+  void read() {
+    for (std::size_t c = 0; c < kSensors; ++c) {
+      const std::size_t j = looked_[c].ticks_back;
+      const SampledSystem& s = looked_[c].to_sample;
+      const Complex u_new = j > 0 ? u_before_[j - 1] : Complex{};  // of tick k - j
+      const Complex u_old = u_before_[j];
+      const Eigen::VectorXcd x = s.A * x_before_[j] + s.B.col(0) * u_new + s.B_late.col(0) * u_old;
+      readings_[c] =
+          (plant_.sensors[c].C * x)(0) + plant_.sensors[c].D * (looked_[c].old_input ? u_old : u_new);
+    }
+  }
+
+  const Plant& plant_;
+  SampledSystem step_;
+  std::vector<Moment> looked_;
+  std::array<Eigen::VectorXcd, kHistory> x_before_;  // newest first
+  std::array<Complex, kHistory + 1> u_before_{};
+  Eigen::VectorXcd x_;
+  Readings readings_{};
+};
+
+}  // namespace
 
 Loop whole_loop(const Plant& plant, const SettledController& settled) {
   constexpr double kImpulse = 1e-5;

@@ -44,32 +44,6 @@ struct Loop {
   bool stable = false;  // the closed loop, in time
 };
 
-/// Answer of each sensor to u, tick to tick.
-std::array<std::vector<Complex>, kSensors> sensor_responses(const Plant& plant,
-                                                            const std::vector<double>& omega_rad_s);
-
-/// Ticks of the closed loop from a small tilt: u of the difference to the steady spin -> does it come back?
-class ClosedLoop {
- public:
-  explicit ClosedLoop(const Plant& plant);
-  const Readings& readings() const { return readings_; }
-  void apply(Complex u);
-  double tilt() const { return std::abs(x_(plant_.tilt)); }
-
- private:
-  static constexpr std::size_t kHistory = 8;
-  void read();
-  const Plant& plant_;
-  SampledSystem step_;
-  std::array<SampledSystem, kSensors> to_sample_;
-  std::array<std::size_t, kSensors> ticks_back_{};
-  std::array<bool, kSensors> old_input_{};
-  std::array<Eigen::VectorXcd, kHistory> x_before_;  // newest first
-  std::array<Complex, kHistory + 1> u_before_{};
-  Eigen::VectorXcd x_;
-  Readings readings_{};
-};
-
 /// Production estimator, reference and feedback, settled at a steady spin.
 class SettledController {
  public:
