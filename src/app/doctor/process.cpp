@@ -19,28 +19,24 @@ constexpr const char* kTelemetryGroup = "239.255.76.67";  // of runtime::kDefaul
 constexpr int kCapIpcLock = 14;                           // <linux/capability.h>
 constexpr int kCapSysNice = 23;
 
+/// The word behind `name` at the start of a line; empty: no line begins so.
+std::string word_behind(const std::string& name, const std::string& path) {
+  std::ifstream file(path);
+  std::string word;
+  for (std::string line; word.empty() && std::getline(file, line);)
+    if (line.rfind(name, 0) == 0) std::istringstream(line.substr(name.size())) >> word;
+  return word;
+}
+
 /// Soft limit of /proc/self/limits, e.g. "Max realtime priority"; -1: unlimited.
 std::int64_t soft_limit(const Patient& patient, const std::string& name) {
-  std::ifstream file(patient.path("/proc/self/limits"));
-  std::string line;
-  while (std::getline(file, line)) {
-    if (line.compare(0, name.size(), name) != 0) continue;
-    std::istringstream rest(line.substr(name.size()));
-    std::string value;
-    rest >> value;
-    return value == "unlimited" ? -1 : std::strtoll(value.c_str(), nullptr, 10);
-  }
-  return 0;
+  const std::string value = word_behind(name, patient.path("/proc/self/limits"));
+  return value == "unlimited" ? -1 : std::strtoll(value.c_str(), nullptr, 10);
 }
 
 bool has_capability(const Patient& patient, int bit) {
-  std::ifstream file(patient.path("/proc/self/status"));
-  std::string line;
-  while (std::getline(file, line)) {
-    if (line.compare(0, 7, "CapEff:") == 0)
-      return ((std::strtoull(line.c_str() + 7, nullptr, 16) >> bit) & 1U) != 0;
-  }
-  return false;
+  const std::string value = word_behind("CapEff:", patient.path("/proc/self/status"));
+  return ((std::strtoull(value.c_str(), nullptr, 16) >> bit) & 1U) != 0;
 }
 
 /// `needed` or more, or the capability that makes the limit irrelevant.
