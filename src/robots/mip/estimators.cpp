@@ -83,17 +83,11 @@ void MipEstimators::from_wheels_and_gyro(Id id, const Mip::Sample& z) noexcept {
   }
 }
 
-void MipEstimators::move(Id id) noexcept {
-  MipEstimate& x = at(id);
-  x.position_W_m += kTickS * rotate(x.psi, Vec2(0.0, axle_speed(params_.robot, x)));
-}
-
 void MipEstimators::complementary(const Mip::Sample& z) noexcept {
   MipEstimate& x = at(Id::kComplementary);
   const double c = params_.complementary_weight;
   x.theta = c * x.theta + kTickS * gyro_previous_ + (1.0 - c) * inclination_previous_;  // (3.29)
   from_wheels_and_gyro(Id::kComplementary, z);
-  move(Id::kComplementary);
 }
 
 void MipEstimators::complementary_kf(const Mip::Sample& z) noexcept {
@@ -104,7 +98,6 @@ void MipEstimators::complementary_kf(const Mip::Sample& z) noexcept {
   x.theta = complementary_kf_.x()(0);
   x.normalized_innovation = complementary_kf_.normalized_innovation();
   from_wheels_and_gyro(Id::kComplementaryKf, z);
-  move(Id::kComplementaryKf);
 }
 
 void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
@@ -120,7 +113,6 @@ void MipEstimators::planar_kf(const Mip::Sample& z, const Vec2& u) noexcept {
   x.theta_dot = state(2);
   x.phi_dot = state(3);
   x.normalized_innovation = planar_kf_.normalized_innovation();
-  move(Id::kPlanarKf);
 }
 
 void MipEstimators::step_ekf(const Mip::Sample& z, const Vec2& u) noexcept {
@@ -129,7 +121,6 @@ void MipEstimators::step_ekf(const Mip::Sample& z, const Vec2& u) noexcept {
   const Vec2 position = x.position_W_m;
   x = ekf_.estimate();
   x.position_W_m = position;
-  move(Id::kEkf);
 }
 
 void MipEstimators::ekf_published(const Mip::Sample& z, const Vec2& u) noexcept {
@@ -149,7 +140,6 @@ void MipEstimators::ekf_published(const Mip::Sample& z, const Vec2& u) noexcept 
   x.phi_dot = state(MipPublishedModel::kPhiDot);
   x.psi_dot = state(MipPublishedModel::kPsiDot);
   x.normalized_innovation = ekf_published_.normalized_innovation();
-  move(Id::kEkfPublished);
 }
 
 void MipEstimators::attitude(const Mip::Sample& z) noexcept {
@@ -160,7 +150,6 @@ void MipEstimators::attitude(const Mip::Sample& z) noexcept {
     x.theta += kTickS * z.gyro_B_rad_s.x();
   }
   from_wheels_and_gyro(Id::kAttitude, z);
-  move(Id::kAttitude);
 }
 
 const MipEstimate& MipEstimators::update(const Mip::Sample& z, const Vec2& u, bool held) noexcept {
@@ -178,6 +167,11 @@ const MipEstimate& MipEstimators::update(const Mip::Sample& z, const Vec2& u, bo
   if (runs(Id::kEkf)) step_ekf(z, u);
   if (runs(Id::kEkfPublished)) ekf_published(z, u);
   if (runs(Id::kAttitude)) attitude(z);
+  for (std::size_t i = 0; i < index(Id::kTruth); ++i) {
+    MipEstimate& x = estimates_[i];
+    if (!runs(static_cast<Id>(i))) continue;
+    x.position_W_m += kTickS * rotate(x.psi, Vec2(0.0, axle_speed(params_.robot, x)));
+  }
   if (z.imu_ok) {
     gyro_previous_ = z.gyro_B_rad_s.x();
     if (runs(Id::kComplementary)) inclination_previous_ = accel_inclination(z.accel_B_m_s2);

@@ -58,7 +58,6 @@ class MipEstimators : public FaultTolerant<Mip, MipEkf, MipEstimatorParams, kMip
  private:
   void start(const Mip::Sample& z) noexcept;
   void from_wheels_and_gyro(Id id, const Mip::Sample& z) noexcept;
-  void move(Id id) noexcept;
   void complementary(const Mip::Sample& z) noexcept;
   void complementary_kf(const Mip::Sample& z) noexcept;
   void planar_kf(const Mip::Sample& z, const Vec2& u) noexcept;
