@@ -33,12 +33,7 @@ Jacobians jacobians(const MbbrParameters& p, double yaw_rate_rad_s) {
   Jacobians out;
   Vec<5> a;
   MbbrHighYaw::accelerations(c, x, u, a, out.state);
-  for (int k = 0; k < 3; ++k) {  // affine in u
-    Vec<5> driven;
-    Mat<5, 7> unused;
-    MbbrHighYaw::accelerations(c, x, u + Vec3::Unit(k), driven, unused);
-    out.input.col(k) = driven - a;
-  }
+  out.input = MbbrHighYaw::input_matrix(c, x, u);
   return out;
 }
 

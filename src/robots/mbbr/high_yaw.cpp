@@ -41,15 +41,15 @@ void MbbrHighYaw::accelerations(const MbbrCoefficients& c, const State& x, const
   J(4, kPhiDotX) -= x(kThetaDotZ);
 }
 
-Mat<5, 3> MbbrHighYaw::rate_input_matrix(const MbbrCoefficients& c) noexcept {
+Mat<5, 3> MbbrHighYaw::input_matrix(const MbbrCoefficients& c, const State& x, const Vec3& u) noexcept {
   Vec<5> free;
   Vec<5> driven;
   Mat<5, 7> J;
-  accelerations(c, State::Zero(), Vec3::Zero(), free, J);
+  accelerations(c, x, u, free, J);
   Mat<5, 3> B;
   for (int k = 0; k < 3; ++k) {
-    accelerations(c, State::Zero(), Vec3::Unit(k), driven, J);
-    B.col(k) = kTickS * (driven - free);
+    accelerations(c, x, u + Vec3::Unit(k), driven, J);
+    B.col(k) = driven - free;
   }
   return B;
 }
@@ -69,11 +69,9 @@ void MbbrHighYaw::inertial_rows(const MbbrCoefficients& c, const State& x, const
   J(2, kThetaDotZ) = 1.0;
   J(2, kThetaX) = -x(kThetaDotY);
   J(2, kThetaDotY) = -x(kThetaX);
-  double h[2];
   double rows[2][7];
-  generated::mbbr::accelerometer(c, x.data(), u.data(), h, rows);
+  generated::mbbr::accelerometer(c, x.data(), u.data(), y.data() + 3, rows);
   for (int i = 0; i < 2; ++i) {
-    y(3 + i) = h[i];
     for (int j = 0; j < 7; ++j) J(3 + i, j) = rows[i][j];
   }
 }
@@ -236,7 +234,7 @@ MbbrLinearModel::MbbrLinearModel(const MbbrParameters& p, bool yaw_transport) no
   H_(3, 3) = 1.0;
   H_(3, 1) = -1.0;
 
-  const Mat<5, 3> B = MbbrHighYaw::rate_input_matrix(c);
+  const Mat<5, 3> B = kTickS * MbbrHighYaw::input_matrix(c, zero, Vec3::Zero());
   B_.setZero();
   D_.setZero();
   for (int k = 0; k < 2; ++k) {

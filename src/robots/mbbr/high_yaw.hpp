@@ -22,8 +22,8 @@ struct MbbrHighYaw {
 
   static void accelerations(const MbbrCoefficients& c, const State& x, const Vec3& u, Vec<5>& a,
                             Mat<5, 7>& J) noexcept;
-  /// Change of the five rates per tick and unit of u, upright at rest.
-  static Mat<5, 3> rate_input_matrix(const MbbrCoefficients& c) noexcept;
+  /// Accelerations per unit of u, in which they are affine.
+  static Mat<5, 3> input_matrix(const MbbrCoefficients& c, const State& x, const Vec3& u) noexcept;
   /// Body rates as the gyro's rows have them, to the first order in the tilt.
   static Vec3 body_rates(const Vec2& theta_xy, const Vec3& theta_dot) noexcept {
     return {theta_dot.x() - theta_xy.y() * theta_dot.z(), theta_dot.y() + theta_xy.x() * theta_dot.z(),
