@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "config/population.hpp"
+
 namespace equipoise {
 
 std::string robot_type(const std::string& path) {
@@ -118,16 +120,6 @@ Precision read_precision(Section& s) {
   return s.choice("precision", {"single", "double"}) == 0 ? Precision::kSingle : Precision::kDouble;
 }
 
-Chain read_chain(Section s) {
-  Chain c;
-  c.gyro_delay_s = s.number("gyro_delay_s", 0.0, 0.01);  // two ticks: the filter's memory
-  c.accel_delay_s = s.number("accel_delay_s", 0.0, 0.02);
-  c.attitude_delay_s = s.number("attitude_delay_s", 0.0, 0.02);
-  c.actuation_delay_s = s.number("actuation_delay_s", 0.0, 0.999 * kTickS);
-  s.finish();
-  return c;
-}
-
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m) {
   AttitudeFilterParams p;
   p.own = s.choice("source", {"packets", "own"}) == 1;
@@ -138,6 +130,16 @@ AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m) {
 }
 
 namespace {
+
+Chain read_chain(Section s) {
+  Chain c;
+  c.gyro_delay_s = s.number("gyro_delay_s", 0.0, 0.01);  // two ticks: the filter's memory
+  c.accel_delay_s = s.number("accel_delay_s", 0.0, 0.02);
+  c.attitude_delay_s = s.number("attitude_delay_s", 0.0, 0.02);
+  c.actuation_delay_s = s.number("actuation_delay_s", 0.0, 0.999 * kTickS);
+  s.finish();
+  return c;
+}
 
 ActualScales read_actual(Section s, bool has_ball) {
   ActualScales a;

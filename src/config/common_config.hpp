@@ -4,11 +4,9 @@
 
 #include <functional>
 
-#include "config/population.hpp"
 #include "config/toml_reader.hpp"
 #include "equipoise/actuate/bridge.hpp"
 #include "equipoise/actuate/safety.hpp"
-#include "equipoise/control/chain.hpp"
 #include "equipoise/control/governor.hpp"
 #include "equipoise/control/plausible.hpp"
 #include "equipoise/estimate/kalman.hpp"
@@ -29,7 +27,6 @@ void require_room(const Section& reference, const DutyBudget& budget);
 MotorParameters read_motor(Section s);
 Calibration read_calibration(Section s, int wheels);
 SafetyParams read_safety(Section s);
-Chain read_chain(Section s);
 Precision read_precision(Section& s);
 /// Of our own filter; `imu_position_m`: lever arm.
 AttitudeFilterParams read_attitude(Section s, const Vec3& imu_position_m);

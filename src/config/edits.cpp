@@ -191,23 +191,16 @@ class SetText {
   mutable const toml::table* root_ = nullptr;  // while applying
 };
 
-void put_numbers(toml::table& calibration, const char* key, const double* values, std::size_t count) {
-  toml::array array;
-  for (std::size_t i = 0; i < count; ++i) array.push_back(values[i]);
-  calibration.insert_or_assign(key, std::move(array));
-}
-
-/// Shortest text that shows the difference.
-std::string shown(double value) {
-  std::ostringstream text;
-  text.precision(10);
-  text << value;
-  return text.str();
-}
-
 bool differs(double a, double b) { return !(std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b))); }
 
 }  // namespace
+
+std::string shortest(double value, int digits) {
+  std::ostringstream text;
+  text.precision(digits);
+  text << value;
+  return text.str();
+}
 
 std::string at(const std::string& path, const toml::source_region& where) {
   if (where.begin.line == 0) return path;
@@ -281,6 +274,7 @@ void apply_includes(toml::table& root, const std::string& path) {
 }
 
 void check_board(const toml::table& root, const std::string& path, const BoardFacts& board) {
+  constexpr int kDigits = 10;  // show what differs
   const auto complain = [&](const std::string& key, const std::string& board_value,
                             const std::string& ours_key, const toml::node& ours, const std::string& value) {
     throw ConfigError(board.file + ": " + key + ": " + board_value + " where " + at(path, ours.source()) +
@@ -290,7 +284,8 @@ void check_board(const toml::table& root, const std::string& path, const BoardFa
     const toml::node* node = toml::at_path(root, ours_key).node();
     if (node == nullptr) return;
     const auto ours = node->value<double>();
-    if (ours && differs(theirs, *ours)) complain(key, shown(theirs), ours_key, *node, shown(*ours));
+    if (ours && differs(theirs, *ours))
+      complain(key, shortest(theirs, kDigits), ours_key, *node, shortest(*ours, kDigits));
   };
   number("bridges.pwm_hz", board.pwm_hz, "motor.pwm_hz");
   number("battery.V_per_count", board.battery_V_per_count, "calibration.battery_V_per_count");
@@ -312,7 +307,10 @@ void apply_measured(toml::table& root, const MeasuredCalibration& measured) {
   toml::table* calibration = root["calibration"].as_table();
   if (calibration == nullptr) return;  // reading it will say so
   const auto put = [&](const char* key, const auto& values) {
-    if (values) put_numbers(*calibration, key, values->data(), values->size());
+    if (!values) return;
+    toml::array array;
+    for (const double value : *values) array.push_back(value);
+    calibration->insert_or_assign(key, std::move(array));
   };
   put("R_BS", measured.R_BS);
   put("gyro_bias_rad_s", measured.gyro_bias_B_rad_s);

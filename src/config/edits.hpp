@@ -11,6 +11,9 @@
 
 namespace equipoise::config {
 
+/// A number in at most so many digits.
+std::string shortest(double value, int digits = 6);
+
 /// "file:line", or "file" where a value has no line.
 std::string at(const std::string& path, const toml::source_region& where);
 

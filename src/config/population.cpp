@@ -1,9 +1,6 @@
 #include "config/population.hpp"
 
-#include <array>
-#include <cstdio>
-
-#include "config/toml_reader.hpp"
+#include "config/edits.hpp"
 #include "equipoise/plant/noise.hpp"
 
 namespace equipoise::config {
@@ -90,12 +87,6 @@ void check(const toml::table& ranges, const std::vector<const toml::table*>& wor
   }
 }
 
-std::string exact(double value) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.17g", value);
-  return text.data();
-}
-
 }  // namespace
 
 double unit_draw(std::int64_t robot, const std::string& key, std::size_t element) noexcept {
@@ -145,7 +136,7 @@ std::vector<std::string> with_robot_drawn(const std::vector<Drawn>& drawn, const
     const bool list = d.values.size() > 1;
     for (std::size_t i = 0; i < d.values.size(); ++i) {
       if (list) setting += i == 0 ? "[" : ", ";
-      setting += exact(d.values[i]);
+      setting += shortest(d.values[i], 17);
     }
     if (list) setting += ']';
     all.push_back(std::move(setting));

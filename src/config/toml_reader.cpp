@@ -14,12 +14,6 @@
 namespace equipoise::config {
 namespace {
 
-std::string shortest(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-
 std::string range(double min, double max) { return shortest(min) + " to " + shortest(max); }
 
 }  // namespace
