@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstring>
 #include <equipoise/bench_t.hpp>
-#include <limits>
 #include <memory>
 
 #include "app/import/import.hpp"

@@ -7,7 +7,6 @@
 #include "app/identify/identification.hpp"
 #include "app/text/files.hpp"
 #include "app/text/json.hpp"
-#include "equipoise/config.hpp"
 
 namespace equipoise::app {
 namespace {

@@ -1,7 +1,6 @@
 #include "app/import/import_map.hpp"
 
 #include <filesystem>
-#include <map>
 
 #include "config/toml_reader.hpp"
 #include "equipoise/types.hpp"

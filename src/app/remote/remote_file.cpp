@@ -4,10 +4,7 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <cstdint>
-#include <optional>
 #include <sstream>
-#include <string>
 
 #include "config/toml_reader.hpp"
 

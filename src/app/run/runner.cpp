@@ -18,13 +18,10 @@
 #include "app/guard/service_notify.hpp"
 #include "app/io/hardware.hpp"
 #include "app/remote/hand_remote.hpp"
-#include "app/run/run_arguments.hpp"
-#include "app/run/status_indicator.hpp"
 #include "app/run/wires.hpp"
 #include "app/text/errors.hpp"
 #include "equipoise/runtime/command_receiver.hpp"
 #include "equipoise/runtime/loop.hpp"
-#include "equipoise/runtime/supervisor.hpp"
 #include "equipoise/runtime/telemetry.hpp"
 
 namespace equipoise::app {

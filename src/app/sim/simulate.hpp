@@ -14,7 +14,6 @@
 #include "app/trial/firmware.hpp"
 #include "app/trial/script.hpp"
 #include "app/trial/verdict.hpp"
-#include "equipoise/samples.hpp"
 
 namespace equipoise::app {
 

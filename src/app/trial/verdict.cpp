@@ -1,7 +1,5 @@
 #include "app/trial/verdict.hpp"
 
-#include <cstdio>
-
 #include "app/text/format.hpp"
 #include "app/text/json.hpp"
 

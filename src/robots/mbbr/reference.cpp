@@ -1,7 +1,5 @@
 #include "robots/mbbr/reference.hpp"
 
-#include <algorithm>
-
 namespace equipoise {
 StateView view(const MbbrReference& ref, const MbbrParameters& p) noexcept {
   StateView v;
