@@ -94,6 +94,29 @@ runtime::TickRecord again(const runtime::TickRecord& tick, Firmware& firmware) {
   return record;
 }
 
+/// One tick of both into the comparison.
+void compare_tunings(const runtime::TickRecord& recorded, const runtime::TickRecord& retuned, Retuned* out) {
+  constexpr auto armed = static_cast<std::int32_t>(ArmState::kArmed);
+  if (recorded.arm_state != armed) return;
+  out->difference.add(retuned.estimate, recorded.estimate);
+  const auto mean_square = [](const runtime::TickRecord& r) {
+    double sum = 0.0;
+    for (int i = 0; i < r.motor_count; ++i) sum += std::pow(r.motors.duty[i], 2) / r.motor_count;
+    return sum;
+  };
+  const auto add = [&](const runtime::TickRecord& r, Retuned::Figures* figures) {
+    if (recorded.has_truth) figures->errors.add(r.estimate, recorded.truth);
+    figures->duty_squared += mean_square(r);
+    figures->innovation += r.estimate.normalized_innovation;
+    if (r.saturated) ++figures->saturated;
+  };
+  add(recorded, &out->recorded);
+  add(retuned, &out->changed);
+  if (retuned.arm_state == armed) return;
+  ++out->not_armed;
+  out->reasons |= retuned.reasons;
+}
+
 /// `follower`, where there is one: its record of the same tick into `retuned`, and into `changed`.
 Replay replay(RunLog& log, Firmware& firmware, std::optional<std::size_t> other, Firmware* follower,
               ChangedLog* changed) {
@@ -176,29 +199,6 @@ void compare(const runtime::TickRecord& logged, const runtime::TickRecord& repla
     *difference = {true, logged.tick, std::string(c.channel) + "." + c.field + index, was[k].value, c.value};
     return;
   }
-}
-
-/// One tick of both into the comparison.
-void compare_tunings(const runtime::TickRecord& recorded, const runtime::TickRecord& retuned, Retuned* out) {
-  constexpr auto armed = static_cast<std::int32_t>(ArmState::kArmed);
-  if (recorded.arm_state != armed) return;
-  out->difference.add(retuned.estimate, recorded.estimate);
-  const auto mean_square = [](const runtime::TickRecord& r) {
-    double sum = 0.0;
-    for (int i = 0; i < r.motor_count; ++i) sum += std::pow(r.motors.duty[i], 2) / r.motor_count;
-    return sum;
-  };
-  const auto add = [&](const runtime::TickRecord& r, Retuned::Figures* figures) {
-    if (recorded.has_truth) figures->errors.add(r.estimate, recorded.truth);
-    figures->duty_squared += mean_square(r);
-    figures->innovation += r.estimate.normalized_innovation;
-    if (r.saturated) ++figures->saturated;
-  };
-  add(recorded, &out->recorded);
-  add(retuned, &out->changed);
-  if (retuned.arm_state == armed) return;
-  ++out->not_armed;
-  out->reasons |= retuned.reasons;
 }
 
 VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept {

@@ -88,9 +88,6 @@ Replay replay_as(const RobotType& robot, RunLog& log, const std::string& origin,
 /// The first number that differs: bit for bit, but any NaN is any other.
 void compare(const runtime::TickRecord& logged, const runtime::TickRecord& replayed, Difference* difference);
 
-/// One tick of both into the comparison.
-void compare_tunings(const runtime::TickRecord& recorded, const runtime::TickRecord& retuned, Retuned* out);
-
 /// As the run judged it.
 VerdictJudge::Tick judged(const runtime::TickRecord& r) noexcept;
 

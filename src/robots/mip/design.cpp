@@ -33,6 +33,40 @@ SecondOrder discrete(const Polynomial& top, const Polynomial& bottom) {
   return {b(0) / a(0), b(1) / a(0), b(2) / a(0), a(1) / a(0), a(2) / a(0)};
 }
 
+/// (psi, psi') and u_z.
+MipLinear mip_yaw_linear(const MipParameters& p) {
+  const MipCoefficients c = mip_coefficients(p, 0.0, p.l);
+  MipLinear s{CMatrix::Zero(2, 2), CMatrix::Zero(2, 1)};
+  s.A(0, 1) = 1.0;
+  s.A(1, 1) = c.psi_ddot_dps;
+  s.b(1, 0) = c.psi_ddot_uz;
+  return s;
+}
+
+MipSlcGains design_mip_slc(const MipParameters& p, const MipSlcDesign& d) {
+  const MipLinear s = mip_linear(p, 0.0);
+  const Eigen::Matrix4d A = s.A.real();
+  CMatrix tilt_and_rates(3, 3);  // without phi, which is an integrator
+  tilt_and_rates << 0.0, 1.0, 0.0, A(2, 0), 0.0, A(2, 3), A(3, 0), 0.0, A(3, 3);
+  const Eigen::VectorXd poles = eigenvalues(tilt_and_rates).real();
+  const double unstable = poles.maxCoeff();
+  const double fastest = -poles.minCoeff();
+  const double hold = hold_per_lean(s);
+
+  const double integral = d.integral_p * unstable;
+  const double lead = d.lead_q * fastest;
+  const double outer_gain = d.outer_gain_pp_a * unstable * unstable / wheel_per_lean(s);
+  const double zero = d.outer_zero_p * unstable;
+  const double pole = d.outer_pole_p * unstable;
+  const double gain = -d.gain_U * hold;
+  MipSlcGains g;
+  g.D1 = discrete({gain * integral, gain * (1.0 + integral / lead), gain / lead},
+                  {0.0, 1.0, 1.0 / d.roll_off_rad_s});
+  g.D2 = discrete({outer_gain, outer_gain / zero, 0.0},
+                  {1.0, 1.0 / pole + 1.0 / d.outer_roll_off_rad_s, 1.0 / (pole * d.outer_roll_off_rad_s)});
+  return g;
+}
+
 }  // namespace
 
 MipLinear mip_linear(const MipParameters& p, double yaw_rate_rad_s) {
@@ -46,15 +80,6 @@ MipLinear mip_linear(const MipParameters& p, double yaw_rate_rad_s) {
   s.A(3, 3) = c.phi_ddot_dph;
   s.b(2, 0) = c.theta_ddot_ux;
   s.b(3, 0) = c.phi_ddot_ux;
-  return s;
-}
-
-MipLinear mip_yaw_linear(const MipParameters& p) {
-  const MipCoefficients c = mip_coefficients(p, 0.0, p.l);
-  MipLinear s{CMatrix::Zero(2, 2), CMatrix::Zero(2, 1)};
-  s.A(0, 1) = 1.0;
-  s.A(1, 1) = c.psi_ddot_dps;
-  s.b(1, 0) = c.psi_ddot_uz;
   return s;
 }
 
@@ -123,30 +148,6 @@ DutyBudget mip_duty_budget(const MipParameters& p, const MipWheelBudget& wheel, 
   b.per_yaw_rate = p.yaw_to_wheel() * against_back_emf;
   b.per_speed = against_back_emf / p.r;
   return b;
-}
-
-MipSlcGains design_mip_slc(const MipParameters& p, const MipSlcDesign& d) {
-  const MipLinear s = mip_linear(p, 0.0);
-  const Eigen::Matrix4d A = s.A.real();
-  CMatrix tilt_and_rates(3, 3);  // without phi, which is an integrator
-  tilt_and_rates << 0.0, 1.0, 0.0, A(2, 0), 0.0, A(2, 3), A(3, 0), 0.0, A(3, 3);
-  const Eigen::VectorXd poles = eigenvalues(tilt_and_rates).real();
-  const double unstable = poles.maxCoeff();
-  const double fastest = -poles.minCoeff();
-  const double hold = hold_per_lean(s);
-
-  const double integral = d.integral_p * unstable;
-  const double lead = d.lead_q * fastest;
-  const double outer_gain = d.outer_gain_pp_a * unstable * unstable / wheel_per_lean(s);
-  const double zero = d.outer_zero_p * unstable;
-  const double pole = d.outer_pole_p * unstable;
-  const double gain = -d.gain_U * hold;
-  MipSlcGains g;
-  g.D1 = discrete({gain * integral, gain * (1.0 + integral / lead), gain / lead},
-                  {0.0, 1.0, 1.0 / d.roll_off_rad_s});
-  g.D2 = discrete({outer_gain, outer_gain / zero, 0.0},
-                  {1.0, 1.0 / pole + 1.0 / d.outer_roll_off_rad_s, 1.0 / (pole * d.outer_roll_off_rad_s)});
-  return g;
 }
 
 MipGains design_mip(const MipParameters& p, const MipDesignParams& d) {

@@ -82,13 +82,12 @@ struct MipDesignParams {
   double input_delay_s = 0.0;  // from the tick to the torque
 };
 
-/// (theta, phi, theta', phi') and u_x about upright at a constant yaw rate; (psi, psi') and u_z.
+/// (theta, phi, theta', phi') and u_x about upright at a constant yaw rate.
 struct MipLinear {
   CMatrix A;
   CMatrix b;
 };
 MipLinear mip_linear(const MipParameters& p, double yaw_rate_rad_s);
-MipLinear mip_yaw_linear(const MipParameters& p);
 
 /// As published with the robot's library, for 100 Hz. [T] (3.50)-(3.51) print these with three digits and
 /// D2's sign reversed, and are unstable so.
@@ -119,7 +118,6 @@ struct MipWheelBudget {
 /// `friction_share`: of Coulomb friction that is compensated.
 DutyBudget mip_duty_budget(const MipParameters& p, const MipWheelBudget& wheel, double friction_share);
 
-MipSlcGains design_mip_slc(const MipParameters& p, const MipSlcDesign& d);
 MipGains design_mip(const MipParameters& p, const MipDesignParams& d);
 
 }  // namespace equipoise
