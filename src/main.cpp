@@ -58,9 +58,6 @@ int main(int argc, char** argv) {
   } catch (const equipoise::ConfigError& error) {
     say(error);
     return 2;
-  } catch (const equipoise::app::InputError& error) {
-    say(error);
-    return 2;
   } catch (const std::exception& error) {
     say(error);
     return 1;

@@ -237,15 +237,10 @@ const Simulated& simulated(const std::string& type) {
 NB_MODULE(_core, m) {
   m.doc() = "Simulation core of equipoise_robot.";
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
-    const auto complain = [](const char* what) {
-      PyErr_SetString(nb::module_::import_("equipoise_robot.errors").attr("UserError").ptr(), what);
-    };
     try {
       std::rethrow_exception(p);
     } catch (const ConfigError& error) {
-      complain(error.what());
-    } catch (const app::InputError& error) {
-      complain(error.what());
+      PyErr_SetString(nb::module_::import_("equipoise_robot.errors").attr("UserError").ptr(), error.what());
     }
   });
   bind_values(m);

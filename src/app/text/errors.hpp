@@ -1,13 +1,13 @@
 // What the user did wrong, as an exception.
 #pragma once
 
-#include <stdexcept>
+#include "equipoise/config.hpp"
 
 namespace equipoise::app {
 
-/// Bad usage or input: exit code 2.
-struct InputError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+/// Bad usage or input, exit code 2, as a wrong configuration is.
+struct InputError : ConfigError {
+  using ConfigError::ConfigError;
 };
 
 }  // namespace equipoise::app
