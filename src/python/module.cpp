@@ -271,16 +271,15 @@ NB_MODULE(_core, m) {
       nb::arg("step_hz"), nb::arg("bode"), "the design as JSON");
   m.def("reason_names", &app::reason_names, nb::arg("reasons"), "of the bits of safety's reasons");
   m.def("degraded_names", &app::degraded_names, nb::arg("degraded"));
-  m.def(
-      "estimators", [](const std::string& type) { return simulated(type).estimators(); }, nb::arg("robot"));
-  m.def(
-      "controllers", [](const std::string& type) { return simulated(type).controllers(); }, nb::arg("robot"));
-  m.def(
-      "error_names", [](const std::string& type) { return simulated(type).error_names(); }, nb::arg("robot"),
-      "of ControllerTick.error");
-  m.def(
-      "observation_names", [](const std::string& type) { return simulated(type).observation_names(); },
-      nb::arg("robot"), "of a row of Episodes' observations");
+  const auto names = [&m](const char* name, auto of_robot, const char* doc) {
+    m.def(
+        name, [of_robot](const std::string& type) { return (simulated(type).*of_robot)(); }, nb::arg("robot"),
+        doc);
+  };
+  names("estimators", &Simulated::estimators, "of the robot");
+  names("controllers", &Simulated::controllers, "of the robot");
+  names("error_names", &Simulated::error_names, "of ControllerTick.error");
+  names("observation_names", &Simulated::observation_names, "of a row of Episodes' observations");
   m.def("calibrated", &calibrated, nb::arg("robot"), nb::arg("config_toml"), nb::arg("gyro"),
         nb::arg("accel"), nb::arg("encoders"), nb::arg("battery"), nb::arg("attitude"),
         "per sample: gyro (3), accelerometer (3), attitude (3), battery, wheel angles");
