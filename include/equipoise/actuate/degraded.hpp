@@ -51,21 +51,15 @@ inline constexpr std::array<DegradedMode, 9> kDegradedModes{{
     {0.1, 2.0 * kPi},
 }};
 
-/// Calls `with(mode)` for every bit that is set.
-template <class With>
-void for_each_degraded(std::uint32_t degraded, With&& with) {
-  for (std::size_t i = 0; i < kDegradedModes.size() && degraded >> i != 0; ++i) {
-    if ((degraded >> i & 1u) != 0) with(kDegradedModes[i]);
-  }
-}
-
 inline Command limited(const Command& command, std::uint32_t degraded) noexcept {
   Command slow = command;
-  for_each_degraded(degraded, [&slow](const DegradedMode& mode) {
+  for (std::size_t i = 0; i < kDegradedModes.size() && degraded >> i != 0; ++i) {
+    if ((degraded >> i & 1u) == 0) continue;
+    const DegradedMode& mode = kDegradedModes[i];
     const double speed = slow.velocity_W_m_s.norm();
     if (speed > mode.max_speed_m_s) slow.velocity_W_m_s *= mode.max_speed_m_s / speed;
     slow.yaw_rate_rad_s = std::clamp(slow.yaw_rate_rad_s, -mode.max_yaw_rate_rad_s, mode.max_yaw_rate_rad_s);
-  });
+  }
   return slow;
 }
 
