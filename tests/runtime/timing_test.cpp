@@ -10,7 +10,7 @@ namespace {
 constexpr std::int64_t kTick_ns = 5'000'000;
 
 TEST(LoopTimingTest, CountsSkippedTicksAndForbidsMotorsAfterALongGap) {
-  LoopTiming timing({});
+  LoopTiming timing;
   std::int64_t now = kTick_ns;
   const auto tick = [&](int ticks_later) {
     now += ticks_later * kTick_ns;
@@ -32,7 +32,7 @@ TEST(LoopTimingTest, CountsSkippedTicksAndForbidsMotorsAfterALongGap) {
 }
 
 TEST(LoopTimingTest, OverrunsInARowForbidMotors) {
-  LoopTiming timing({});
+  LoopTiming timing;
   std::int64_t now = kTick_ns;
   for (int i = 0; i < 4; ++i) {
     EXPECT_FALSE(timing.overrun());
@@ -43,7 +43,7 @@ TEST(LoopTimingTest, OverrunsInARowForbidMotors) {
 }
 
 TEST(LoopTimingTest, OverrunsApartFromEachOtherDoNot) {
-  LoopTiming timing({});
+  LoopTiming timing;
   std::int64_t now = kTick_ns;
   for (int i = 0; i < 40; ++i) {
     now += i % 4 == 3 ? 2 * kTick_ns : kTick_ns;

@@ -21,7 +21,7 @@ struct Watched {
 
 class Supervisor {
  public:
-  explicit Supervisor(const Watched& watched) : timing_({}), watched_(watched), guard_(kGuardSilent_ns) {
+  explicit Supervisor(const Watched& watched) : watched_(watched), guard_(kGuardSilent_ns) {
     if (watched.page != nullptr) cut_ = watched.page->cut.load(std::memory_order_acquire);
   }
 

@@ -60,24 +60,16 @@ class TimeHistogram {
   std::int64_t max_ns_ = 0;
 };
 
-struct OverrunPolicy {
-  std::int64_t period_ns = 5'000'000;
-  int max_missed_at_once = 2;  // ticks; the guard acts after three
-  int max_in_a_row = 3;        // ticks, each with an overrun
-};
-
 class LoopTiming {
  public:
-  explicit LoopTiming(const OverrunPolicy& policy) : p_(policy) {}
-
   /// At wake-up. `sample_ns`: the data-ready edge, or the last one again if none came.
   void begin(std::int64_t now_ns, std::int64_t sample_ns) noexcept {
     const bool edge = sample_ns != sample_ns_ && sample_ns <= now_ns;
-    const std::int64_t due_ns = edge || due_ns_ == 0 ? sample_ns : due_ns_ + p_.period_ns;
+    const std::int64_t due_ns = edge || due_ns_ == 0 ? sample_ns : due_ns_ + kPeriod_ns;
     now_.wake_late_ns = started_ ? (now_ns > due_ns ? now_ns - due_ns : 0) : 0;
     // Half a period of slack: an edge that comes late by less has not lost a tick.
-    const std::int64_t gap = started_ ? now_ns - wake_ns_ : p_.period_ns;
-    missed_ = gap > 0 ? (gap + p_.period_ns / 2) / p_.period_ns - 1 : 0;
+    const std::int64_t gap = started_ ? now_ns - wake_ns_ : kPeriod_ns;
+    missed_ = gap > 0 ? (gap + kPeriod_ns / 2) / kPeriod_ns - 1 : 0;
     if (missed_ < 0) missed_ = 0;
     now_.overruns += missed_;
     in_a_row_ = missed_ > 0 ? in_a_row_ + 1 : 0;
@@ -94,14 +86,17 @@ class LoopTiming {
   }
 
   /// Too much was missed to go on with motors on.
-  bool overrun() const noexcept { return missed_ > p_.max_missed_at_once || in_a_row_ >= p_.max_in_a_row; }
+  bool overrun() const noexcept { return missed_ > kMaxMissedAtOnce || in_a_row_ >= kMaxInARow; }
 
   const TickTiming& now() const noexcept { return now_; }
   const TimeHistogram& wake() const noexcept { return wake_; }
   const TimeHistogram& compute() const noexcept { return compute_; }
 
  private:
-  OverrunPolicy p_;
+  static constexpr std::int64_t kPeriod_ns = 5'000'000;
+  static constexpr int kMaxMissedAtOnce = 2;  // ticks; the guard acts after three
+  static constexpr int kMaxInARow = 3;        // ticks, each with an overrun
+
   TickTiming now_;
   bool started_ = false;
   std::int64_t wake_ns_ = 0;
