@@ -149,10 +149,6 @@ void write_whole(const std::string& text, const std::string& path) {
   throw InputError(path + ": " + (written ? error.message() : "cannot be written"));
 }
 
-void save_calibration(const CalibrationFile& file, const std::string& path) {
-  write_whole(to_toml(file), path);
-}
-
 MeasuredCalibration measured_of(const CalibrationFile& file, const std::array<double, 9>& board_R_BS) {
   const Mat3 board = Eigen::Map<const RowMajor>(board_R_BS.data());
   const Mat3 R_BS = file.mount ? file.mount->R_BS : board;

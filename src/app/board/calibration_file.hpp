@@ -55,8 +55,6 @@ struct CalibrationFile {
 CalibrationFile load_calibration(const std::string& path, const std::string& robot);
 CalibrationFile parse_calibration(const std::string& text, const std::string& origin);
 std::string to_toml(const CalibrationFile& file);
-/// Whole or not at all: through a temporary file beside it.
-void save_calibration(const CalibrationFile& file, const std::string& path);
 
 /// For a robot whose board file says R_BS (rows); the file's own mount has precedence.
 MeasuredCalibration measured_of(const CalibrationFile& file, const std::array<double, 9>& R_BS);
@@ -64,7 +62,7 @@ MeasuredCalibration measured_of(const CalibrationFile& file, const std::array<do
 /// Now, and the temperature where the IMU tells it (not 0).
 CalibrationFile::Stamp stamp_of(double temperature_degC);
 
-/// As save_calibration; InputError when it cannot be written.
+/// Whole or not at all: through a temporary file beside it; InputError when it cannot be written.
 void write_whole(const std::string& text, const std::string& path);
 
 }  // namespace equipoise::app

@@ -89,7 +89,7 @@ int run_bringup(const BringupArguments& a) {
     if (!still_wrong.empty())
       throw JobError("after the correction: " + still_wrong + "; nothing was written");
   }
-  save_calibration(calibration, calibration_path);
+  write_whole(to_toml(calibration), calibration_path);
   write_whole(text, a.out);
   std::fprintf(
       a.json == "-" ? stderr : stdout,

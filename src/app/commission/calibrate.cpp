@@ -189,7 +189,7 @@ int run_calibrate(const CalibrateArguments& a) {
                         : a.what == "motors" ? calibrate_motors(commissioning, &file, &json)
                                              : calibrate_encoders(commissioning, &file, &json);
   const bool rejected = a.what == "accel" && !result.complaint.empty();  // others measure what is there
-  if (!rejected) save_calibration(file, a.out);
+  if (!rejected) write_whole(to_toml(file), a.out);
   std::FILE* const out = a.json == "-" ? stderr : stdout;
   std::fprintf(out, "%s\n%s %s\n", result.text.c_str(), rejected ? "not written to" : "written to",
                a.out.c_str());

@@ -20,10 +20,6 @@ constexpr int kStroke_ticks = 12;  // 60 ms
 constexpr double kSureSigmas = 6.0;
 constexpr double kSureAngle = 0.8;  // cosine between kick and a wheel's axis
 
-Vec3 gyro_of(const RawSample& raw, const Calibration& c) {
-  return c.R_BS * (c.gyro_rad_s_per_count * Eigen::Map<const Vec3>(raw.gyro_counts));
-}
-
 /// Travel of every encoder since `start`, turns.
 std::array<double, kMaxMotors> travel(const RawSample& start, const RawSample& now,
                                       const WheelLayout& layout) {
@@ -139,7 +135,7 @@ Kick shake(ManualDrive& manual, const WheelLayout& layout, const Calibration& c,
   for (const double sense : kSense) {
     for (int i = 0; i < kStroke_ticks; ++i) {
       const RawSample raw = manual.drive(only(layout, finding.motor, sense * drive));
-      const Vec3 gyro = gyro_of(raw, c) - bias;
+      const Vec3 gyro = c.R_BS * (c.gyro_rad_s_per_count * Eigen::Map<const Vec3>(raw.gyro_counts)) - bias;
       const double rate = rad_per_count * (raw.encoder_counts[k] - last) * kTickHz;
       last = raw.encoder_counts[k];
       rate_squares += rate * rate;

@@ -109,7 +109,7 @@ std::unique_ptr<ManualDrive> Commissioning::open() {
                                " finds the cause)");
   }
   auto manual = std::make_unique<ManualDrive>(io, std::move(ask), guard_ ? &guard_->page() : nullptr);
-  const std::string broken = self_test(manual->io());
+  const std::string broken = self_test(io);
   if (!broken.empty()) throw std::runtime_error(board_path_ + ": self-test: " + broken);
   return manual;
 }

@@ -9,14 +9,6 @@
 #include "equipoise/runtime/monotonic.hpp"
 
 namespace equipoise::app {
-namespace {
-
-std::string missing_of(const RawSample& raw) {
-  if (!imu_ok(raw)) return "the IMU delivers no valid sample";
-  return "an encoder cannot be read";
-}
-
-}  // namespace
 
 RawSample ManualDrive::next() {
   for (int missed = 0;; ++missed) {
@@ -30,7 +22,9 @@ RawSample ManualDrive::next() {
       temperature_degC_ = raw.imu_temperature_degC;
       return raw;
     }
-    if (missed >= kMayMiss) throw JobError(missing_of(raw) + " (equipoise doctor finds the cause)");
+    if (missed < kMayMiss) continue;
+    const std::string what = imu_ok(raw) ? "an encoder cannot be read" : "the IMU delivers no valid sample";
+    throw JobError(what + " (equipoise doctor finds the cause)");
   }
 }
 

@@ -45,7 +45,7 @@ class ManualDrive : NoCopy {
  public:
   /// `heartbeat`: of the guard that holds the bridges; nullptr: nobody does.
   ManualDrive(rio_t io, Ask ask, runtime::HeartbeatPage* heartbeat = nullptr)
-      : hardware_(io), io_(io), ask_(std::move(ask)), heartbeat_(heartbeat) {}
+      : hardware_(io), ask_(std::move(ask)), heartbeat_(heartbeat) {}
   ~ManualDrive() { (void)motors_off(); }
 
   /// Next tick's sample, all of it valid; JobError after a few that are not, or after Ctrl-C.
@@ -58,7 +58,6 @@ class ManualDrive : NoCopy {
   Stillness hold_still(double seconds);
   /// JobError when the person stops.
   std::string ask(const Request& request);
-  const rio_t& io() const { return io_; }
 
  private:
   RawSample next();
@@ -67,7 +66,6 @@ class ManualDrive : NoCopy {
   void beat();
 
   Hardware hardware_;
-  rio_t io_;
   Ask ask_;
   runtime::HeartbeatPage* heartbeat_;
   runtime::BeatWatch guard_{runtime::kGuardSilent_ns};
