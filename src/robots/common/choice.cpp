@@ -1,6 +1,5 @@
 #include "robots/common/choice.hpp"
 
-#include <algorithm>
 #include <limits>
 
 namespace equipoise {
@@ -9,11 +8,6 @@ std::size_t fidelity_level(const std::string& name) {
   const auto level = std::find(kFidelityNames.begin(), kFidelityNames.end(), name);
   if (level == kFidelityNames.end()) throw ConfigError("fidelity \"" + name + "\" is unknown");
   return static_cast<std::size_t>(level - kFidelityNames.begin());
-}
-
-void allow_another_robot(SafetyParams* safety) {
-  safety->max_identical_samples = 0;
-  safety->max_innovation = std::max(safety->max_innovation, safety->max_innovation_published);
 }
 
 void doubt_nothing(const Choice& choice, SafetyParams* safety) {

@@ -2,6 +2,7 @@
 // choices -> out: the same, for this estimator, attitude source, world and backend. Start-up only.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <string>
 
@@ -24,9 +25,6 @@ struct Choice {
 /// Index of a name of kFidelityNames; ConfigError when it is none.
 std::size_t fidelity_level(const std::string& name);
 
-/// An engine's IMU may be noiseless and stand still, and its robot is not the one the filters were tuned on.
-void allow_another_robot(SafetyParams* safety);
-
 /// The twin of a simulated run, in which only a fall, a limit of the motors or a sensor that is gone ends it;
 /// ConfigError on a board.
 void doubt_nothing(const Choice& choice, SafetyParams* safety);
@@ -44,7 +42,11 @@ Config with_choice(Config config, const Choice& choice, const std::array<const c
   config.safety.needs_attitude = config.estimators.active == packets;
   if (config.estimators.active == published)
     config.safety.max_innovation = config.safety.max_innovation_published;
-  if (choice.backend == "lockstep") allow_another_robot(&config.safety);
+  if (choice.backend == "lockstep") {  // its IMU may be noiseless and stand still, its robot another one
+    config.safety.max_identical_samples = 0;
+    config.safety.max_innovation =
+        std::max(config.safety.max_innovation, config.safety.max_innovation_published);
+  }
   if (!config.safety.detection) doubt_nothing(choice, &config.safety);
   config.estimators.detection = config.safety.detection;
   // In simulation the firmware is configured for the robot it is on: the level's bridge and IMU, no
