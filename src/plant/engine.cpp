@@ -8,9 +8,6 @@ namespace {
 
 constexpr double kRollingStart_m_s = 0.005;  // below it rolling resistance fades
 
-/// As the robots' own worlds draw it.
-Vec3 start_attitude(NoiseStream& noise, double sigma_rad) { return noise.gaussian_vector<3>(sigma_rad); }
-
 EngineMotion started(Engine& engine, const Vec3& theta_rad) {
   EngineMotion motion;
   const auto [w, x, y, z] = quaternion_of(theta_rad);
@@ -28,7 +25,7 @@ EngineBody::EngineBody(const Calibration& calibration, const WorldParams& world,
       engine_(engine),
       start_noise_(world.seed, kStartNoise),
       loop_noise_(world.seed, kLoop),
-      motion_(started(engine, start_attitude(start_noise_, world.initial_tilt_rad))),
+      motion_(started(engine, start_noise_.gaussian_vector<3>(world.initial_tilt_rad))),  // as our worlds do
       yaw_rad_(euler_angles(motion_.R_WB).z()),
       sensors_(calibration, world, wheels, start_noise_, euler_angles(motion_.R_WB)) {}
 
