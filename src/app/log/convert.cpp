@@ -49,25 +49,16 @@ constexpr auto each_number = [](auto message, const auto& record, auto&& each) {
   });
 };
 
-/// Which channels a log has, in alphabetical order.
-std::set<std::string, std::less<>> channels_of(const std::string& path) {
-  std::set<std::string, std::less<>> channels;
-  LogReader reader = LogReader::open(path);
-  for (LogEvent event; reader.next(&event);) {
-    channels.emplace(event.channel);
-  }
-  return channels;
-}
-
 /// One row per tick; columns channel.field. What a tick lacks is an empty cell.
 class CsvRows {
  public:
   explicit CsvRows(const std::string& path) {
-    for (const std::string& channel : channels_of(path)) {
-      has_truth_ = has_truth_ || channel == fields::kTruthChannel;
-      has_faults_ = has_faults_ || channel == fields::kFaultsChannel;
-      if (channel.rfind(fields::kComparedChannel, 0) == 0)
-        estimators_.push_back(short_name(channel.substr(fields::kComparedChannel.size())));
+    LogReader reader = LogReader::open(path);
+    for (LogEvent event; reader.next(&event);) {
+      has_truth_ = has_truth_ || event.channel == fields::kTruthChannel;
+      has_faults_ = has_faults_ || event.channel == fields::kFaultsChannel;
+      if (event.channel.rfind(fields::kComparedChannel, 0) == 0)
+        estimators_.insert(short_name(event.channel.substr(fields::kComparedChannel.size())));
     }
   }
 
@@ -112,7 +103,7 @@ class CsvRows {
 
  private:
   bool has_truth_ = false, has_faults_ = false;
-  std::vector<std::string> estimators_;
+  std::set<std::string> estimators_;
   std::string row_;
 };
 
