@@ -132,7 +132,7 @@ TEST(NotFooled, BySensorsThatLie) {
                               {"edumip", "gyro_z_flipped", "slc", "spin_driving", {17, 32, 92}},
                               {"edumip", "gyro_zx_swapped", "lqr", "spin_driving", {56, 202}},
                               {"edumip", "gyro_x_flipped", "lqr", "spin_driving", {77, 258, 283}},
-                              {"edumip", "gyro_x_flipped", "slc", "driving", {2103, 2107, 2115, 2126}},
+                              {"edumip", "gyro_x_flipped", "slc", "driving", {2103, 2107, 2120, 2126}},
                               {"edumip", "gyro_y_zero", "slc", "spin_driving", {15039}},
                               {"mbbr", "gyro_yz_swapped", "scheduled", "balancing", {16191, 16206, 16225}},
                               {"mbbr", "gyro_zx_swapped", "scheduled", "balancing", {16169, 16268}},

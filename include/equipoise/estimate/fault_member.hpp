@@ -46,7 +46,7 @@ struct FaultMember {
 
   static constexpr double kNoise_rad_s = 0.15;  // of an IMU that shakes: real robots that roll reach 0.1
   static constexpr double kNoise_m_s2 = 3.0;    // and 3
-  static constexpr double kTooFar_rad = 0.3;    // that a robot tilts: half its limit
+  static constexpr double kTooFar_rad = 0.6;    // that a robot tilts: its limit
 
   Filter filter;
   bool owes = false;   // its correction, which a refuted hypothesis never needs

@@ -57,7 +57,6 @@ class AttitudeFilter {
 
   Eigen::Quaterniond q_EB() const noexcept { return (q_EI_ * q_IB_).normalized(); }
   const Vec3& gyro_bias_B_rad_s() const noexcept { return bias_; }
-  bool at_rest() const noexcept { return at_rest_; }
 
  private:
   void detect_rest(const Vec3& gyro, const Vec3& force) noexcept;
