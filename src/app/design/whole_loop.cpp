@@ -22,6 +22,7 @@ struct Moment {
 
 std::vector<Moment> moments(const Plant& plant) {
   std::vector<Moment> out;
+  out.reserve(plant.sensors.size());
   for (const SensorRow& sensor : plant.sensors) out.emplace_back(plant, sensor);
   return out;
 }
