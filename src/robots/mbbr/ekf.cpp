@@ -205,9 +205,11 @@ void MbbrEkf::predict(const Vec3& u) noexcept {
   if (push_N > 0.0) allow_push(push_N);
   const double turn = 0.5 * kTickS * (rate_before + x()(Model::kThetaDotZ));
   const Vec2 mean = 0.5 * (before + x().segment<2>(Model::kPhiDotX));
-  phi_ += kTickS * (direction_ * Turn::small(0.5 * turn))(mean);
+  const Turn half = Turn::small(0.5 * turn);
+  direction_ = direction_ * half;
+  phi_ += kTickS * direction_(mean);
+  direction_ = direction_ * half;
   heading_ += turn;
-  direction_ = Turn(heading_);
 }
 
 void MbbrEkf::adopt(const MbbrEkf& other) noexcept {
