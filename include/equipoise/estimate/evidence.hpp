@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "equipoise/estimate/used_sensors.hpp"
 #include "equipoise/samples.hpp"
 
 namespace equipoise {
@@ -81,18 +82,18 @@ class Evidence {
       const bool stood = std::exchange(stands_[row], repeats(row, came));
       faulty_[row] = (stands_[row] ? log_stands_ : log_turns_)[stood];
     }
-    double misfit = 0.0;
+    misfit_ = 0.0;
     shaken_most_ = within_ = 0.0;
     const double density = log_density(f, used, came, [&](std::size_t row, double width, double says) {
       per_area_[row] = 1.0 / (2.0 * kPi * spread(f, row));
       width_[row] = width - 1.0;
       const double peak = -0.5 * width;
       peak_[row] = stands_[row] ? std::max(peak, log_still_) : peak;
-      misfit += peak_[row] - says;
+      misfit_ += peak_[row] - says;
       if (row >= kWheelRow && row < kAccelRow && peak_[row] - says < 0.5) within_ += peak_[row] - says;
       shaken_most_ += std::max(shaken_[row] - peak_[row], 0.0);
     });
-    expected_ = density + misfit;
+    expected_ = density + misfit_;
     knows_less_ = !(density > kDiverged);
     for (std::size_t row = 0; row < kRows; ++row) {
       knows_less_ = knows_less_ || f.row_variance()[row] > kWidened * variance_[row];
@@ -108,11 +109,11 @@ class Evidence {
   double within_a_sigma() const noexcept { return within_; }
   /// What a filter could say of this tick at most that uses some rows of `all`, and so is surer of none: it
   /// need not run to be refuted.
-  double most(const Sample& all, const Sample& used, const Sample& came) const noexcept {
+  double most(const Sample& all, const UsedSensors<Wheels>& used, const Sample& came) const noexcept {
     double sum = 0.0;
     for (std::size_t row = 0; row < kRows; ++row) {
-      if (!comes(came, row) || comes(all, row) == comes(used, row)) continue;
-      if (comes(used, row)) return kOutlier;
+      if (!comes(came, row) || comes(all, row) != used.leaves_out(row)) continue;
+      if (!comes(all, row)) return kOutlier;
       sum += faulty_[row] - peak_[row];
     }
     return most_of(sum);
@@ -128,6 +129,14 @@ class Evidence {
     }
     return most_of(sum);
   }
+  /// The same of one that begins and reads a row otherwise, those before it as expect()'s filter `f`.
+  double most(const Filter& f, const Sample& all, std::size_t row, double reads) const noexcept {
+    if (!comes(all, row)) return kOutlier;
+    const double off = f.row_innovation()[row] + reads - reading(all, row);
+    return most_of(std::max(-0.5 * off * off / spread(f, row), shaken_[row] - peak_[row]));
+  }
+  /// The innovations are larger than noise makes them on the average.
+  bool surprises() const noexcept { return misfit_ > kRows / (2.0 * kModelError * kModelError); }
   double operator()(const Filter& f, const Sample& used, const Sample& came) const noexcept {
     return bounded(log_density(f, used, came));
   }
@@ -309,9 +318,7 @@ class Evidence {
     return sum > kDiverged ? sum : kDiverged;
   }
 
-  double most_of(double sum) const noexcept {
-    return std::max(sum + shaken_most_ + kRounding, 3.0 - kOutlier) + 0.05;  // log(1 + exp(-3)) < 0.05
-  }
+  double most_of(double sum) const noexcept { return std::max(sum + shaken_most_ + kRounding, -kOutlier); }
 
   /// A faulty sensor reads anything in its range.
   double log_anything(std::size_t row) const noexcept {
@@ -320,9 +327,7 @@ class Evidence {
     return -std::log(2.0 * p_.wheel_step_rad);
   }
 
-  double bounded(double log_density) const noexcept {
-    return std::log(std::exp(std::min(log_density - expected_, 100.0)) + std::exp(-kOutlier));
-  }
+  double bounded(double log_density) const noexcept { return std::max(log_density - expected_, -kOutlier); }
 
   EvidenceParams p_;
   double log_still_;                      // of an encoder that repeats itself
@@ -333,6 +338,7 @@ class Evidence {
   std::array<double, kRows> per_area_{};  // 1 / (2 pi variance)
   std::array<double, kRows> width_{};     // log(2 pi variance) - 1
   double shaken_most_ = 0.0;              // what could be above it
+  double misfit_ = 0.0;                   // what it would say more without any innovation
   double within_ = 0.0;
   std::array<double, kRows> variance_{};  // a tick ago
   bool knows_less_ = true;

@@ -39,6 +39,7 @@ struct FaultHypothesis {
   constexpr bool healthy() const noexcept { return kind >= kSpin; }
   constexpr bool of_imu() const noexcept { return kind >= kAxis && !healthy(); }
   constexpr bool pushes() const noexcept { return kind == kPush || kind == kRock; }
+  constexpr bool happens() const noexcept { return kind == kSpin || kind == kSlip || kind == kPush; }
   constexpr bool waits() const noexcept { return kind == kBias || kind == kEvent; }  // to be begun
   constexpr bool leaves_out() const noexcept {
     return kind == kWheel || kind == kWheels || kind == kAxis || kind == kImu || kind == kRock;

@@ -79,12 +79,24 @@ struct FaultMember {
     ratio = std::max(ratio - nats, least);
     apart = true;
   }
+  /// Its filter need not run: the tick refutes it down to `least` without, or it would begin `anew`, from
+  /// `healthy`, with a loss, and says no less if it begins later. What is as expected is no event.
+  template <class Evidence, class Sample>
+  bool is_needless(const FaultHypothesis& h, const Evidence& weigh, const Filter& healthy, const Sample& all,
+                   const Sample& z, bool anew, double as_used, double least) const noexcept {
+    const double so_far = anew ? 0.0 : ratio;
+    if (h.happens() && !(so_far > 0.0) && !weigh.surprises()) return true;
+    const double then = so_far + most(h, weigh, healthy, all, z, anew) - as_used;
+    return anew ? then <= 0.0 : then <= least && !apart;
+  }
   /// What a tick says for it at most.
   template <class Evidence, class Sample>
-  double most(const FaultHypothesis& h, const Evidence& weigh, const Sample& all,
-              const Sample& z) const noexcept {
+  double most(const FaultHypothesis& h, const Evidence& weigh, const Filter& healthy, const Sample& all,
+              const Sample& z, bool anew) const noexcept {
     if (h.kind == FaultHypothesis::kNoise) return weigh.most(all, kNoise_rad_s, kNoise_m_s2);
-    return h.leaves_out() ? weigh.most(all, used.of(z), z) : Evidence::kOutlier;
+    if (h.kind == FaultHypothesis::kSwap && anew)
+      return weigh.most(healthy, all, static_cast<std::size_t>(h.first()), used.gyro_B_rad_s(z)(h.first()));
+    return h.leaves_out() ? weigh.most(all, used, z) : Evidence::kOutlier;
   }
   void refute(double to) noexcept {
     ratio = to;

@@ -202,9 +202,7 @@ class SensorFaults {
       if constexpr (kRocks) {
         if (anew && h.healthy()) members_[fault_index<Wheels>(FaultHypothesis::kEvent)].keep(m);
       }
-      const double most = (anew ? 0.0 : m.ratio) + m.most(h, weigh_, all, z) - as_used;
-      // A sum that begins with a loss says no more than one that begins later.
-      if (anew ? most <= 0.0 : most <= -kMargin && !m.apart) return m.refute(-kMargin);
+      if (m.is_needless(h, weigh_, healthy_, all, z, anew, as_used, -kMargin)) return m.refute(-kMargin);
     }
     ++ran_;
     if (i != kNoise) noise_.vibrate(m.filter, weigh_.vibration_rad_s(), p_.evidence.gyro_sigma_rad_s);

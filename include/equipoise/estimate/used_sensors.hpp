@@ -29,21 +29,31 @@ struct UsedSensors {
   Measurement<Wheels> of(const Measurement<Wheels>& z) const noexcept {
     Measurement<Wheels> s = z;
     s.imu_ok = z.imu_ok && imu;
-    s.gyro_B_rad_s -= bias_rad_s;
+    s.gyro_B_rad_s = gyro_B_rad_s(z);
     s.wheel_angle_rad += offset_rad;
     if (reversed >= 0) s.wheel_angle_rad(reversed) = 2.0 * mirror_rad - s.wheel_angle_rad(reversed);
-    for (int i = 0; i < 3; ++i) {
-      const int k = (i + 1) % 3;
-      if (swapped != (1U << i | 1U << k)) continue;
-      std::swap(s.gyro_B_rad_s(i), s.gyro_B_rad_s(k));
-      s.gyro_B_rad_s(i) *= swap_sign;
-      s.gyro_B_rad_s(k) *= swap_sign;
-    }
     for (std::size_t i = 0; i < 3; ++i)
       s.gyro_axis_ok[i] = z.gyro_axis_ok[i] && (without_axes >> i & 1U) == 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(Wheels); ++i)
       s.wheel_ok[i] = z.wheel_ok[i] && (without_wheels >> i & 1U) == 0;
     return s;
+  }
+  Vec3 gyro_B_rad_s(const Measurement<Wheels>& z) const noexcept {
+    Vec3 gyro = z.gyro_B_rad_s - bias_rad_s;
+    for (int i = 0; i < 3; ++i) {
+      const int k = (i + 1) % 3;
+      if (swapped != (1U << i | 1U << k)) continue;
+      std::swap(gyro(i), gyro(k));
+      gyro(i) *= swap_sign;
+      gyro(k) *= swap_sign;
+    }
+    return gyro;
+  }
+  /// Rows of gyro, wheels, accelerometer.
+  bool leaves_out(std::size_t row) const noexcept {
+    constexpr std::size_t kAccel = 3 + static_cast<std::size_t>(Wheels);
+    if (row >= 3 && row < kAccel) return (without_wheels >> (row - 3) & 1U) != 0;
+    return !imu || (row < 3 && (without_axes >> row & 1U) != 0);
   }
 
   /// Between two ticks.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -106,10 +107,12 @@ TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
   const Sample all = standing();
   for (int k = 0; k < 20000; ++k) {
     Told everything, less;
-    Sample some = all;
-    for (bool& ok : some.gyro_axis_ok) ok = share(random) < 0.7;
-    for (bool& ok : some.wheel_ok) ok = share(random) < 0.7;
-    some.imu_ok = share(random) < 0.9;
+    UsedSensors<3> used;
+    for (std::uint32_t bit = 1; bit < 8; bit *= 2) {
+      if (share(random) > 0.7) used.without_axes |= bit;
+      if (share(random) > 0.7) used.without_wheels |= bit;
+    }
+    used.imu = share(random) < 0.9;
     for (std::size_t row = 0; row < 8; ++row) {
       everything.variance[row] = std::pow(10.0, -6.0 + 10.0 * share(random));
       less.variance[row] = everything.variance[row] * (share(random) < 0.5 ? 1.0 : 1.0 + 4.0 * share(random));
@@ -117,11 +120,53 @@ TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
       less.innovation[row] = 0.1 * everything.innovation[row];
     }
     evidence.expect(everything, all, all);
-    ASSERT_LE(evidence(less, some, all), evidence.most(all, some, all)) << k;
+    ASSERT_LE(evidence(less, used.of(all), all), evidence.most(all, used, all)) << k;
   }
-  EXPECT_GE(evidence.most(UsedSensors<3>{}.turned_over({FaultHypothesis::kImu, 0}).of(all), all, all),
+  const UsedSensors<3> every;
+  EXPECT_GE(evidence.most(every.turned_over({FaultHypothesis::kImu, 0}).of(all), every, all),
             TheEvidence::kOutlier)
       << "a sensor more: anything";
+}
+
+/// The rows before as healthy, those behind as well as they can.
+TEST(Evidence, AFilterThatReadsARowOtherwiseNeverSaysMoreThanItMay) {
+  using TheEvidence = Evidence<Told, 3>;
+  TheEvidence evidence(kParams);
+  evidence.reset(0.0);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  const Sample all = standing();
+  int refuted = 0;
+  for (int k = 0; k < 20000; ++k) {
+    Told healthy;
+    for (std::size_t row = 0; row < 8; ++row) {
+      healthy.variance[row] = std::pow(10.0, -6.0 + 7.0 * share(random));
+      healthy.innovation[row] = 3.0 * (2.0 * share(random) - 1.0) * std::sqrt(healthy.variance[row]);
+    }
+    const double as_used = evidence.expect(healthy, all, all);
+    const std::size_t row = k % 3;
+    const double reads = 4.0 * (share(random) - 0.5);
+    Told other = healthy;
+    other.innovation[row] += reads - all.gyro_B_rad_s(static_cast<int>(row));
+    std::fill(other.innovation.begin() + static_cast<std::ptrdiff_t>(row) + 1, other.innovation.end(), 0.0);
+    const double most = evidence.most(healthy, all, row, reads);
+    ASSERT_LE(evidence(other, all, all), most) << k;
+    refuted += most <= as_used ? 1 : 0;
+  }
+  EXPECT_GT(refuted, 5000) << "it decides";
+}
+
+TEST(Evidence, ATickIsASurpriseThatIsMoreThanNoise) {
+  Evidence<Told, 3> evidence(kParams);
+  evidence.reset(0.0);
+  Told filter;
+  filter.variance.fill(1e-2);
+  const Sample z = standing();
+  for (const double sigmas : {0.9, 1.1}) {
+    filter.innovation.fill(sigmas * 0.1);
+    evidence.expect(filter, z, z);
+    EXPECT_EQ(evidence.surprises(), sigmas > 1.0) << sigmas;
+  }
 }
 
 TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
