@@ -136,7 +136,9 @@ class Evidence {
     return most_of(std::max(-0.5 * off * off / spread(f, row), shaken_[row] - peak_[row]));
   }
   /// The innovations are larger than noise makes them on the average.
-  bool surprises() const noexcept { return misfit_ > kRows / (2.0 * kModelError * kModelError); }
+  bool surprises() const noexcept {
+    return knows_less_ || misfit_ > kRows / (2.0 * kModelError * kModelError);
+  }
   double operator()(const Filter& f, const Sample& used, const Sample& came) const noexcept {
     return bounded(log_density(f, used, came));
   }
@@ -327,7 +329,10 @@ class Evidence {
     return -std::log(2.0 * p_.wheel_step_rad);
   }
 
-  double bounded(double log_density) const noexcept { return std::max(log_density - expected_, -kOutlier); }
+  /// At most 100: what is expected may have lost its way.
+  double bounded(double log_density) const noexcept {
+    return std::clamp(log_density - expected_, -kOutlier, 100.0);
+  }
 
   EvidenceParams p_;
   double log_still_;                      // of an encoder that repeats itself

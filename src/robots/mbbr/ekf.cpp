@@ -206,10 +206,10 @@ void MbbrEkf::predict(const Vec3& u) noexcept {
   const double turn = 0.5 * kTickS * (rate_before + x()(Model::kThetaDotZ));
   const Vec2 mean = 0.5 * (before + x().segment<2>(Model::kPhiDotX));
   const Turn half = Turn::small(0.5 * turn);
-  direction_ = direction_ * half;
-  phi_ += kTickS * direction_(mean);
-  direction_ = direction_ * half;
+  const Turn middle = direction_ * half;
+  phi_ += kTickS * middle(mean);
   heading_ += turn;
+  direction_ = std::abs(turn) < 0.2 ? middle * half : Turn(heading_);  // beyond, half is not exact
 }
 
 void MbbrEkf::adopt(const MbbrEkf& other) noexcept {

@@ -162,11 +162,15 @@ TEST(Evidence, ATickIsASurpriseThatIsMoreThanNoise) {
   Told filter;
   filter.variance.fill(1e-2);
   const Sample z = standing();
+  evidence.expect(filter, z, z);
   for (const double sigmas : {0.9, 1.1}) {
     filter.innovation.fill(sigmas * 0.1);
     evidence.expect(filter, z, z);
     EXPECT_EQ(evidence.surprises(), sigmas > 1.0) << sigmas;
   }
+  filter.innovation.fill(NAN);
+  evidence.expect(filter, z, z);
+  EXPECT_TRUE(evidence.surprises());
 }
 
 TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
