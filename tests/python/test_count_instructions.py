@@ -119,10 +119,16 @@ MOST_FILTER_CYCLES = {"mbbr": 40_000, "mip": 14_000}
 def test_the_robots_processor_needs_few_cycles_for_a_tick_in_every_mode(committed, robot):
     counts = committed["cortex_a8"][robot]
     assert counts["filter_cycles"] <= MOST_FILTER_CYCLES[robot]
+    assert counts["bank_in_filters"] <= 5.0
     assert counts["tick_cycles"] <= 0.1 * counts["dense_tick_cycles"]
     assert set(counts["modes"]) == set(count_page.MODES)
     longest = max(mode["most"] for mode in counts["modes"].values())
     assert longest <= count_page.LONGEST_TICK_S * count_page.CLOCK_HZ
+
+
+def test_an_edumips_whole_firmware_is_below_the_load_aimed_at(committed):
+    load = count_page.whole_load(committed["firmware"], committed["firmware_tick"], committed["cortex_a8"])
+    assert load["mip"][3] <= 0.09
 
 
 def test_the_mbbrs_log_costs_a_quarter_of_a_tick(committed):
