@@ -23,8 +23,7 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
   runtime::BeatWatch loop(options.silent_ticks * options.period_ns);
   bool on = false;
   end.error = bridges.off();
-  const std::int64_t poll_ns =
-      options.period_ns / 3;  // off within the third silent tick: seen, acted on a poll late
+  const std::int64_t poll_ns = options.period_ns / 4;  // seen late by one, acted on late by another
   std::int64_t due_ns = runtime::monotonic_now_ns();
   std::int64_t next_watchdog_ns = 0;
   while (!stop.load(std::memory_order_relaxed)) {
