@@ -38,6 +38,15 @@ struct Told {
   Vec3 wheel_rate_rad_s() const { return rate_rad_s; }
 };
 
+/// Filters drawn at random, `share` from 0 to 1.
+struct EvidenceOfAny : testing::Test {
+  Evidence<Told, 3> evidence{kParams};
+  const Sample all = standing();
+  std::mt19937 random;
+  double share() { return std::uniform_real_distribution<double>(0.0, 1.0)(random); }
+  EvidenceOfAny() { evidence.reset(0.0); }
+};
+
 TEST(Evidence, OneTickSaysNoMoreThanItsBound) {
   using TheEvidence = Evidence<Told, 3>;
   TheEvidence evidence(EvidenceParams{0.01, 0.02, 0.2, 0.0, {}});
@@ -98,25 +107,20 @@ TEST(Evidence, AnEncoderThatStandsIsDeadIfItsWheelTurns) {
   EXPECT_NEAR(faulty(), 0.5 * 0.03 * 0.03 / 4e-4, 0.15) << "a healthy one does not";
 }
 
-TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
-  using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(kParams);
-  evidence.reset(0.0);
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> share(0.0, 1.0);
-  const Sample all = standing();
+TEST_F(EvidenceOfAny, AFilterThatUsesLessNeverSaysMoreThanItMay) {
+  random.seed(3);
   for (int k = 0; k < 20000; ++k) {
     Told everything, less;
     UsedSensors<3> used;
     for (std::uint32_t bit = 1; bit < 8; bit *= 2) {
-      if (share(random) > 0.7) used.without_axes |= bit;
-      if (share(random) > 0.7) used.without_wheels |= bit;
+      if (share() > 0.7) used.without_axes |= bit;
+      if (share() > 0.7) used.without_wheels |= bit;
     }
-    used.imu = share(random) < 0.9;
+    used.imu = share() < 0.9;
     for (std::size_t row = 0; row < 8; ++row) {
-      everything.variance[row] = std::pow(10.0, -6.0 + 10.0 * share(random));
-      less.variance[row] = everything.variance[row] * (share(random) < 0.5 ? 1.0 : 1.0 + 4.0 * share(random));
-      everything.innovation[row] = 3.0 * share(random) * std::sqrt(everything.variance[row]);
+      everything.variance[row] = std::pow(10.0, -6.0 + 10.0 * share());
+      less.variance[row] = everything.variance[row] * (share() < 0.5 ? 1.0 : 1.0 + 4.0 * share());
+      everything.innovation[row] = 3.0 * share() * std::sqrt(everything.variance[row]);
       less.innovation[row] = 0.1 * everything.innovation[row];
     }
     evidence.expect(everything, all, all);
@@ -124,28 +128,23 @@ TEST(Evidence, AFilterThatUsesLessNeverSaysMoreThanItMay) {
   }
   const UsedSensors<3> every;
   EXPECT_GE(evidence.most(every.turned_over({FaultHypothesis::kImu, 0}).of(all), every, all),
-            TheEvidence::kOutlier)
+            decltype(evidence)::kOutlier)
       << "a sensor more: anything";
 }
 
 /// The rows before as healthy, those behind as well as they can.
-TEST(Evidence, AFilterThatReadsARowOtherwiseNeverSaysMoreThanItMay) {
-  using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(kParams);
-  evidence.reset(0.0);
-  std::mt19937 random(6);
-  std::uniform_real_distribution<double> share(0.0, 1.0);
-  const Sample all = standing();
+TEST_F(EvidenceOfAny, AFilterThatReadsARowOtherwiseNeverSaysMoreThanItMay) {
+  random.seed(6);
   int refuted = 0;
   for (int k = 0; k < 20000; ++k) {
     Told healthy;
     for (std::size_t row = 0; row < 8; ++row) {
-      healthy.variance[row] = std::pow(10.0, -6.0 + 7.0 * share(random));
-      healthy.innovation[row] = 3.0 * (2.0 * share(random) - 1.0) * std::sqrt(healthy.variance[row]);
+      healthy.variance[row] = std::pow(10.0, -6.0 + 7.0 * share());
+      healthy.innovation[row] = 3.0 * (2.0 * share() - 1.0) * std::sqrt(healthy.variance[row]);
     }
     const double as_used = evidence.expect(healthy, all, all);
     const std::size_t row = k % 3;
-    const double reads = 4.0 * (share(random) - 0.5);
+    const double reads = 4.0 * (share() - 0.5);
     Told other = healthy;
     other.innovation[row] += reads - all.gyro_B_rad_s(static_cast<int>(row));
     std::fill(other.innovation.begin() + static_cast<std::ptrdiff_t>(row) + 1, other.innovation.end(), 0.0);
@@ -173,17 +172,12 @@ TEST(Evidence, ATickIsASurpriseThatIsMoreThanNoise) {
   EXPECT_TRUE(evidence.surprises());
 }
 
-TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
-  using TheEvidence = Evidence<Told, 3>;
-  TheEvidence evidence(kParams);
-  evidence.reset(0.0);
-  std::mt19937 random(4);
-  std::uniform_real_distribution<double> share(0.0, 1.0);
-  const Sample all = standing();
+TEST_F(EvidenceOfAny, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
+  random.seed(4);
   for (int k = 0; k < 20000; ++k) {
     Told everything, noisy;
     for (std::size_t row = 0; row < 8; ++row) {
-      everything.variance[row] = std::pow(10.0, -6.0 + 7.0 * share(random));
+      everything.variance[row] = std::pow(10.0, -6.0 + 7.0 * share());
       const double noise = row < 3 ? 0.15 : row < 6 ? 0.0 : 3.0;
       noisy.variance[row] = everything.variance[row] + noise * noise;
     }
@@ -193,20 +187,16 @@ TEST(Evidence, AFilterThatTakesTheImuToBeNoisyNeverSaysMoreThanItMay) {
   }
 }
 
-TEST(Evidence, OneLogarithmSaysAsMuchAsOneForEachRow) {
-  Evidence<Told, 3> evidence(kParams);
-  evidence.reset(0.0);
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> share(0.0, 1.0);
-  const Sample z = standing();
+TEST_F(EvidenceOfAny, OneLogarithmSaysAsMuchAsOneForEachRow) {
+  random.seed(5);
   for (int k = 0; k < 20000; ++k) {
     Told filter;
     for (std::size_t row = 0; row < 8; ++row) {
-      filter.variance[row] = std::pow(10.0, -6.0 + 8.0 * share(random));
-      filter.innovation[row] = 12.0 * share(random) * share(random) * std::sqrt(filter.variance[row]);
+      filter.variance[row] = std::pow(10.0, -6.0 + 8.0 * share());
+      filter.innovation[row] = 12.0 * share() * share() * std::sqrt(filter.variance[row]);
     }
-    const double by_row = evidence.expect(filter, z, z);
-    ASSERT_NEAR(evidence(filter, z, z), by_row, 1e-11) << k;
+    const double by_row = evidence.expect(filter, all, all);
+    ASSERT_NEAR(evidence(filter, all, all), by_row, 1e-11) << k;
   }
 }
 
