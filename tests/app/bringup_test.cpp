@@ -210,7 +210,7 @@ TEST(ManualDrive, ATickThatTheGuardFoundTooLateEndsTheJob) {
   runtime::HeartbeatPage page{};
   ManualDrive manual(
       mock.io(), [](const Request&, std::string*) { return true; }, &page);
-  page.guard = 1;
+  page.guard_ns = runtime::monotonic_now_ns();
   manual.drive({0.1, 0, 0, 0});
   page.cut = 1;
   EXPECT_THROW(manual.drive({0.1, 0, 0, 0}), JobError);

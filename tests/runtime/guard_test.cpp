@@ -81,9 +81,9 @@ class GuardProcess : public ::testing::Test {
   }
 
   bool beats() {
-    for (int i = 0; i < 1000 && page().guard.load() == 0; ++i)
+    for (int i = 0; i < 1000 && page().guard_ns.load() == 0; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    return page().guard.load() != 0;
+    return page().guard_ns.load() != 0;
   }
   runtime::HeartbeatPage& page() { return heartbeat_.page(); }
 
@@ -135,7 +135,7 @@ class GuardProcess : public ::testing::Test {
       if (tick == hang_after) pause();  // as in a read that never comes back: the lost interrupt
       for (const char* name : {"pwm0", "pwm1", "pwm2"}) std::ofstream(dir_ / name, std::ios::in) << "25000\n";
       beat_ns_->store(runtime::monotonic_now_ns());
-      page().loop.fetch_add(1);
+      page().loop_ns.store(*beat_ns_);
       due_ns += kTick_ns;
       runtime::sleep_until(due_ns);
     }
@@ -225,7 +225,7 @@ TEST_F(GuardProcess, BridgesSleepWhenTheLoopDoesNotDrive) {
 
 TEST_F(GuardProcess, EndsWithTheProcessThatStartedIt) {
   end(guard_);
-  page().guard.store(0);
+  page().guard_ns.store(0);
   int to_parent[2];
   ASSERT_EQ(pipe(to_parent), 0);
   robot_ = fork();
@@ -262,11 +262,11 @@ TEST_F(GuardProcess, StopsTheMotorsOfAStoppedLoop) {
 TEST_F(GuardProcess, StopsTheMotorsOfALoopThatWaitsForALostInterrupt) {
   const double ms = worst_off_ms(
       [this] {
-        std::uint32_t last = 0;
+        std::int64_t last = 0;
         do {  // until it beats no more
-          last = page().loop.load();
+          last = page().loop_ns.load();
           std::this_thread::sleep_for(std::chrono::microseconds(5500));
-        } while (last != page().loop.load());
+        } while (last != page().loop_ns.load());
       },
       40);
   judge("lost interrupt", ms);
@@ -279,12 +279,12 @@ TEST_F(GuardProcess, MotorsStayOffWhenAStoppedLoopWakesUpUntilItHasLetGo) {
   kill(loop_, SIGSTOP);
   ASSERT_TRUE(wait_for(false));
   kill(loop_, SIGCONT);
-  const std::uint32_t woken = page().loop.load();
+  const std::int64_t woken_ns = page().loop_ns.load();
   for (int i = 0; i < 200; ++i) {  // it beats and asks for its motors as if nothing had happened
     EXPECT_EQ(value("enable"), "0") << i << " ms after it woke";
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  EXPECT_GT(page().loop.load(), woken + 10);
+  EXPECT_GT(page().loop_ns.load(), woken_ns + 10 * kTick_ns);
   EXPECT_EQ(page().cut.load(), cut + 1);  // what tells the loop to disarm
   page().answered.store(cut + 1);
   EXPECT_TRUE(wait_for(true));

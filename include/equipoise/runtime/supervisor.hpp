@@ -16,12 +16,12 @@ struct Watched {
   HeartbeatPage* page = nullptr;                  // without a guard: none
   std::uint32_t standing = 0;                     // known before the start, e.g. kRealtimeMissing
   const std::atomic<bool>* log_failed = nullptr;  // Telemetry's; without a log: none
-  bool simulated_time = false;                    // a tick takes none
+  bool simulated_time = false;                    // a tick takes none, and no guard watches
 };
 
 class Supervisor {
  public:
-  explicit Supervisor(const Watched& watched) : watched_(watched), guard_(kGuardSilent_ns) {
+  explicit Supervisor(const Watched& watched) : watched_(watched) {
     if (watched.page != nullptr) cut_ = watched.page->cut.load(std::memory_order_acquire);
   }
 
@@ -34,7 +34,8 @@ class Supervisor {
       reasons |= kLogFailed;  // nothing runs unrecorded
     if (watched_.page != nullptr) {
       const std::uint32_t cut = watched_.page->cut.load(std::memory_order_acquire);
-      if (!guard_.alive(watched_.page->guard.load(std::memory_order_acquire), now_ns)) reasons |= kGuardDead;
+      if (now_ns - watched_.page->guard_ns.load(std::memory_order_acquire) > kGuardSilent_ns)
+        reasons |= kGuardDead;
       if (cut != cut_) reasons |= kOverrun;  // it stopped us: we were too late
       cut_ = cut;
     }
@@ -44,12 +45,14 @@ class Supervisor {
   /// `driven`: this tick's command has the bridges awake; `write_error`: what writing it returned.
   void end(bool driven, int write_error) noexcept {
     write_error_ = write_error;
+    if (watched_.simulated_time) return;
+    const std::int64_t now_ns = monotonic_now_ns();
     if (watched_.page != nullptr) {
       watched_.page->want_enable.store(driven ? 1 : 0, std::memory_order_relaxed);
       if (!driven) watched_.page->answered.store(cut_, std::memory_order_relaxed);
-      watched_.page->loop.fetch_add(1, std::memory_order_release);
+      watched_.page->loop_ns.store(now_ns, std::memory_order_release);
     }
-    if (!watched_.simulated_time) timing_.end(monotonic_now_ns());
+    timing_.end(now_ns);
   }
 
   const LoopTiming& timing() const noexcept { return timing_; }
@@ -58,7 +61,6 @@ class Supervisor {
   LoopTiming timing_;
   Watched watched_;
   std::uint32_t cut_ = 0;
-  BeatWatch guard_;
   int write_error_ = 0;
 };
 

@@ -38,8 +38,9 @@ int ManualDrive::motors_off() noexcept {
 
 void ManualDrive::beat() {
   if (heartbeat_ == nullptr) return;
-  heartbeat_->loop.fetch_add(1, std::memory_order_release);
-  if (!guard_.alive(heartbeat_->guard.load(std::memory_order_acquire), runtime::monotonic_now_ns()))
+  const std::int64_t now_ns = runtime::monotonic_now_ns();
+  heartbeat_->loop_ns.store(now_ns, std::memory_order_release);
+  if (now_ns - heartbeat_->guard_ns.load(std::memory_order_acquire) > runtime::kGuardSilent_ns)
     throw JobError("the guard process has died; motors are off");
   if (heartbeat_->cut.load(std::memory_order_acquire) != heartbeat_->answered.load(std::memory_order_relaxed))
     throw JobError(

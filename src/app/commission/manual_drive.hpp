@@ -68,7 +68,6 @@ class ManualDrive : NoCopy {
   Hardware hardware_;
   Ask ask_;
   runtime::HeartbeatPage* heartbeat_;
-  runtime::BeatWatch guard_{runtime::kGuardSilent_ns};
   double temperature_degC_ = 0.0;
 };
 

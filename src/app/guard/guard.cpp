@@ -4,6 +4,7 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -20,19 +21,15 @@ namespace equipoise::app {
 GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::HeartbeatPage& page,
                     const std::atomic<bool>& stop) {
   GuardEnd end;
-  runtime::BeatWatch loop(options.silent_ticks * options.period_ns);
+  const std::int64_t limit_ns = options.silent_ticks * options.period_ns + options.period_ns / 4;
   bool on = false;
   end.error = bridges.off();
-  const std::int64_t poll_ns = options.period_ns / 4;  // seen late by one, acted on late by another
-  std::int64_t due_ns = runtime::monotonic_now_ns();
   std::int64_t next_watchdog_ns = 0;
   while (!stop.load(std::memory_order_relaxed)) {
-    due_ns += poll_ns;
-    runtime::sleep_until(due_ns);
+    const std::int64_t beat_ns = page.loop_ns.load(std::memory_order_acquire);  // before the clock is read
     const std::int64_t now_ns = runtime::monotonic_now_ns();
-    if (now_ns - due_ns > options.period_ns) due_ns = now_ns;  // late ourselves: no burst of polls
-    page.guard.fetch_add(1, std::memory_order_release);
-    const bool alive = loop.alive(page.loop.load(std::memory_order_acquire), now_ns);
+    const std::int64_t silent_ns = now_ns - beat_ns;
+    const bool alive = silent_ns >= 0 && silent_ns <= limit_ns;
     const bool asked = page.want_enable.load(std::memory_order_relaxed) != 0;
     // Once the loop has let go it means what it asks for.
     const bool answered =
@@ -58,6 +55,10 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
       notify_service_manager("WATCHDOG=1");
       next_watchdog_ns = now_ns + options.watchdog_ns;
     }
+    page.guard_ns.store(now_ns, std::memory_order_release);
+    // A loop that falls silent is cut at the limit, not at the next look.
+    const std::int64_t late_ns = alive ? beat_ns + limit_ns + 1 : now_ns + options.period_ns;
+    runtime::sleep_until(std::min(now_ns + options.period_ns, late_ns));
   }
   const int error = bridges.off();
   if (error != 0) end.error = error;

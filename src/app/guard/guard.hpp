@@ -1,5 +1,5 @@
 // The guard: stops the bridges when the loop's heartbeat stops. In: heartbeat page, bridges -> out: bridges
-// asleep and every PWM at zero within silent_ticks of the last beat and half a tick (two polls), whatever
+// asleep and every PWM at zero a quarter of a tick after silent_ticks without a beat, whatever
 // happened to the loop (SIGKILL, SIGSTOP, hang). Bridges wake only while the loop beats and asks for them;
 // once they were cut, a loop that comes back must have let go first.
 #pragma once
@@ -50,7 +50,7 @@ class FileBridges final : public Bridges {
 
 struct GuardOptions {
   std::int64_t period_ns = 5'000'000;
-  int silent_ticks = 2;  // and up to two polls, half a tick: off before the third tick is over
+  int silent_ticks = 2;  // and a quarter, by which a tick may be late: off before the third is over
   std::int64_t watchdog_ns = 200'000'000;
 };
 

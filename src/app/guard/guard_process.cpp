@@ -99,7 +99,7 @@ GuardProcess::GuardProcess(const std::string& board_path) {
       throw std::runtime_error(
           what.append(" (equipoise doctor --board ").append(board_path).append(" finds the cause)"));
     }
-    if (page().guard.load(std::memory_order_acquire) != 0) return;  // it beats
+    if (page().guard_ns.load(std::memory_order_acquire) != 0) return;  // it beats
     std::this_thread::sleep_for(kPoll);
   }
   stop();
