@@ -18,7 +18,8 @@ namespace equipoise::runtime {
 namespace {
 
 constexpr std::uint32_t kSync = 0xEDA1DA01U;
-constexpr std::size_t kHeaderBytes = 28;  // sync, number, time, two lengths
+constexpr std::size_t kHeaderBytes = 28;        // sync, number, time, two lengths
+constexpr std::size_t kWriteBytes = 1U << 14U;  // some ten ticks
 constexpr auto kRoomCheckPeriod = std::chrono::seconds(1);
 constexpr auto kSyncPeriod = std::chrono::milliseconds(50);
 
@@ -110,8 +111,8 @@ void LogWriter::preamble(std::int64_t utime, std::string_view channel,
 void LogWriter::event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data) {
   const std::size_t before = used_;
   used_ += kHeaderBytes + channel.size() + data.size();
-  if (used_ > tick_.size()) tick_.resize(2 * used_);
-  std::uint8_t* at = tick_.data() + before;
+  if (used_ > ticks_.size()) ticks_.resize(2 * used_);
+  std::uint8_t* at = ticks_.data() + before;
   at = store_big_endian(kSync, at);
   at = store_big_endian(static_cast<std::uint64_t>(event_number_++), at);
   at = store_big_endian(static_cast<std::uint64_t>(utime), at);
@@ -121,7 +122,8 @@ void LogWriter::event(std::int64_t utime, std::string_view channel, const std::v
   std::copy(data.begin(), data.end(), at);
 }
 
-void LogWriter::end_tick() {
+void LogWriter::end_tick(bool more) {
+  if (more && used_ < kWriteBytes) return;
   write_out();
   if (const int error = sync_error_.load(std::memory_order_relaxed)) fail(error);
   if (!is_open()) return;
@@ -132,7 +134,7 @@ void LogWriter::end_tick() {
 void LogWriter::write_out() {
   std::size_t done = 0;
   while (is_open() && done < used_) {
-    const ssize_t written = ::write(fd_, tick_.data() + done, used_ - done);
+    const ssize_t written = ::write(fd_, ticks_.data() + done, used_ - done);
     if (written > 0) {
       done += static_cast<std::size_t>(written);
     } else if (written == 0 || errno != EINTR) {

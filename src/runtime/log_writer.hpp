@@ -1,4 +1,4 @@
-// An LCM event log that survives: a whole tick per write, cut back to its last whole tick when the disk is
+// An LCM event log that survives: whole ticks per write, cut back to its last whole tick when the disk is
 // full, continued in a further file when it is large, oldest files deleted when space is short. A log that
 // another process is writing is left alone.
 // In: events -> out: NAME.lcm, NAME.0001.lcm, ...; each starts with the preamble. What write() took survives
@@ -37,8 +37,8 @@ class LogWriter : NoCopy {
   /// Repeated at the start of every further file.
   void preamble(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data);
   void event(std::int64_t utime, std::string_view channel, const std::vector<std::uint8_t>& data);
-  /// The tick's events go to the kernel, all or none.
-  void end_tick();
+  /// The tick's events go to the kernel, all or none; where more follow at once, with theirs.
+  void end_tick(bool more = false);
   void close();
 
  private:
@@ -56,7 +56,7 @@ class LogWriter : NoCopy {
   std::string preamble_channel_;
   std::vector<std::uint8_t> preamble_;
   std::int64_t preamble_utime_ = 0;
-  std::vector<std::uint8_t> tick_;  // its events, the first `used_` bytes
+  std::vector<std::uint8_t> ticks_;  // their events, the first `used_` bytes
   std::size_t used_ = 0;
   int part_ = 0;
   std::deque<std::string> files_;  // of this run, oldest first

@@ -14,9 +14,9 @@ namespace equipoise::runtime {
 namespace {
 
 constexpr std::size_t kQueueTicks = 1024;  // five seconds at 200 Hz
-// Between looks at an empty queue: two ticks on a robot, where to wake up costs more than to write one, and
+// Between looks at an empty queue: four ticks on a robot, where to wake up costs more than to write one, and
 // a log that SIGKILL may cut by 100 ms has time; less for a simulation, which waits when the queue is full.
-constexpr auto kIdle = std::chrono::milliseconds(10);
+constexpr auto kIdle = std::chrono::milliseconds(20);
 constexpr auto kIdleOfSimulation = std::chrono::milliseconds(2);
 
 std::string upper(std::string text) {
@@ -61,9 +61,13 @@ class Telemetry::Writer : NoCopy {
     tick_ = r.tick;
     if (log_.is_open() || publish_now_) messages(r);
     if (r.compute_ns > 0) histogram(r);  // simulated time takes no time
-    log_.end_tick();
-    note_failure();
     ++report_->records;
+  }
+
+  /// `more`: another record is waiting.
+  void end_tick(bool more) {
+    log_.end_tick(more);
+    note_failure();
   }
 
   void end(const EndRecord& end) {
@@ -170,11 +174,13 @@ void Telemetry::hand_over(const TickRecord& record) noexcept {
 void Telemetry::run() {
   for (;;) {
     const bool stopping = stop_.load(std::memory_order_acquire);
-    bool any = false;
-    while (const TickRecord* record = queue_.front()) {
+    const TickRecord* record = queue_.front();
+    const bool any = record != nullptr;
+    while (record != nullptr) {
       writer_->write(*record);
       queue_.drop();
-      any = true;
+      record = queue_.front();
+      writer_->end_tick(record != nullptr);
     }
     if (stopping) break;
     if (!any) std::this_thread::sleep_for(options_.wait_when_full ? kIdleOfSimulation : kIdle);

@@ -47,6 +47,23 @@ TEST_F(LogWriterTest, ATickReachesTheFileWholeAndAtOnce) {
   }
 }
 
+TEST_F(LogWriterTest, TicksBehindWhichOthersWaitAreWrittenTogether) {
+  LogWriter log;
+  ASSERT_TRUE(log.open(path_, {}));
+  const std::vector<std::uint8_t> data(1000 - 28 - 8);
+  int ticks = 0;
+  for (; fs::file_size(path_) == 0; ++ticks) {
+    log.event(0, "CHANNEL1", data);
+    log.end_tick(ticks != 2);
+  }
+  EXPECT_EQ(fs::file_size(path_), 3000) << "none waits behind the third";
+  for (ticks = 0; fs::file_size(path_) == 3000; ++ticks) {
+    log.event(0, "CHANNEL1", data);
+    log.end_tick(true);
+  }
+  EXPECT_EQ(ticks, 17) << "16 kB are enough";
+}
+
 TEST_F(LogWriterTest, ALogOfTheSameNameIsReplacedWithAllItsPartsOrKept) {
   for (const char* name :
        {"run.lcm", "run.0001.lcm", "run.12345.lcm", "run.001.lcm", "run.x.lcm", "runs.lcm"})
