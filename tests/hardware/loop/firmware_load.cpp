@@ -112,6 +112,15 @@ pid_t start(const PinRobot& robot) {
   _exit(127);
 }
 
+/// Interrupt threads as on a robot.
+void run_real_time_machine() {
+  if (fork() != 0) return;
+  const std::string script =
+      fs::read_symlink("/proc/self/exe").parent_path() / "../../../../packaging/real-time-machine";
+  execl("/bin/sh", "sh", script.c_str(), nullptr);
+  _exit(127);
+}
+
 nlohmann::json load(const PinRobot& robot) {
   Bench bench;
   PinWorld world(bench, robot, 1);
@@ -122,6 +131,7 @@ nlohmann::json load(const PinRobot& robot) {
 
   const pid_t firmware = start(robot);
   for (int i = 0; i < kToStart && world.held(); ++i) world.advance();
+  run_real_time_machine();
   advance(&world, kToSettle);
   const Account begun = account();
   advance(&world, kCounted);
