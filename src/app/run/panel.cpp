@@ -8,9 +8,9 @@
 namespace equipoise::app {
 namespace {
 
-constexpr auto kPoll = std::chrono::milliseconds(10);
-constexpr unsigned kStablePolls = 3;
-constexpr unsigned kPollsPerBlink = 50;
+constexpr auto kPoll = std::chrono::milliseconds(25);  // contacts bounce for less, fingers press for longer
+constexpr unsigned kStablePolls = 2;
+constexpr unsigned kPollsPerBlink = 20;
 
 std::optional<button_t> opened(const BoardLine& line, bool active_low, const char* name) {
   button_t button{};
