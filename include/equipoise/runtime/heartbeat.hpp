@@ -15,7 +15,7 @@ struct HeartbeatPage {
   static constexpr std::uint32_t kMagic = 0x45514842;  // "EQHB"
   std::atomic<std::uint32_t> magic;
   std::atomic<std::int64_t> loop_ns;       // monotonic: the loop's last beat, one per whole tick; 0: none yet
-  std::atomic<std::int64_t> guard_ns;      // and when the guard last looked, once per tick
+  std::atomic<std::int64_t> guard_ns;      // and when the guard last looked
   std::atomic<std::uint32_t> cut;          // times the guard has stopped the motors
   std::atomic<std::uint32_t> want_enable;  // 1: the loop drives; the guard keeps the bridges awake
   std::atomic<std::int64_t> cut_ns;        // monotonic; the motors were off by then, the last time
@@ -25,7 +25,7 @@ static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
                   std::atomic<std::int64_t>::is_always_lock_free,
               "shared between processes");
 
-/// The guard looks once per tick: silent for six, it is dead.
+/// The guard looks at every second tick at least: silent for six, it is dead.
 inline constexpr std::int64_t kGuardSilent_ns = 30'000'000;
 
 /// Maps the page; throws std::runtime_error saying what is wrong with it.

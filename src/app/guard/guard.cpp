@@ -56,9 +56,9 @@ GuardEnd guard_loop(const GuardOptions& options, Bridges& bridges, runtime::Hear
       next_watchdog_ns = now_ns + options.watchdog_ns;
     }
     page.guard_ns.store(now_ns, std::memory_order_release);
-    // A loop that falls silent is cut at the limit, not at the next look.
-    const std::int64_t late_ns = alive ? beat_ns + limit_ns + 1 : now_ns + options.period_ns;
-    runtime::sleep_until(std::min(now_ns + options.period_ns, late_ns));
+    // A loop that drives and falls silent is cut at the limit, not at the next look.
+    runtime::sleep_until(on ? std::min(now_ns + 2 * options.period_ns, beat_ns + limit_ns + 1)
+                            : now_ns + options.period_ns);
   }
   const int error = bridges.off();
   if (error != 0) end.error = error;
