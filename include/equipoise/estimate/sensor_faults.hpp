@@ -295,7 +295,8 @@ class SensorFaults {
     const bool can_wait = h.kind == FaultHypothesis::kSwap && !p_.balance(h.mask);
     if (can_wait) return left_out_explains(h) ? m.ratio - kEventPrior : -kMargin;
     if (h.wiring()) return m.ratio - (m.from_start ? 1.0 : 3.0) * kEventPrior;
-    return m.ratio + (h.healthy() && ticks_ - event_at_ > kEventTicks ? kEventPrior : 0.0);
+    const bool may_be = h.healthy() && m.ratio > -kMargin && ticks_ - event_at_ > kEventTicks;
+    return m.ratio + (may_be ? kEventPrior : 0.0);
   }
 
   void decide(Filter& control, const Vec3& believed_rad_s) noexcept {

@@ -250,6 +250,7 @@ TEST_F(Standing, AVerdictSaysWhatLedAndByHowMuch) {
     const FaultEvidence& e = detector.evidence();
     ASSERT_GE(e.leading, 0);
     ASSERT_NE(e.leading, e.runner_up);
+    ASSERT_GT(e.ratio, -5.0) << "what is refuted does not lead";
     ASSERT_EQ(e.decided, detector.bias_jumps() > 0);
     if (e.decided) decided.push_back(e);
     if (!e.decided) {
