@@ -70,8 +70,10 @@ struct FaultMember {
   }
   /// If it is true, the body tilts by too much within `ticks` more than a control believes.
   bool is_urgent(const Vec3& believed_rad_s, int ticks) noexcept {
-    const Vec3 turns_rad_s = body_rates(settled().estimate());
-    const double unseen_rad_s = turns_rad_s.head<2>().norm() - believed_rad_s.head<2>().norm();
+    const Vec2 turns = body_rates(settled().estimate()).template head<2>();
+    const Vec2 believed = believed_rad_s.head<2>();
+    const bool backwards = turns.dot(believed) < 0.0;  // the control does the opposite of what is needed
+    const double unseen_rad_s = backwards ? (turns - believed).norm() : turns.norm() - believed.norm();
     return ticks * kTickS * unseen_rad_s > kTooFar_rad;
   }
   /// What is used goes on from elsewhere, which explains `nats` of what this does.

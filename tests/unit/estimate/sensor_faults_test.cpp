@@ -142,6 +142,20 @@ class Standing : public testing::Test {
   }
 };
 
+TEST_F(Standing, AVerdictDoesNotWaitWhileTheControlMakesItWorse) {
+  const auto urgent = [this](double turns_rad_s, double believed_rad_s) {
+    Sample z = at_rest();
+    z.gyro_B_rad_s = Vec3(turns_rad_s, 0.0, 0.0);
+    control.start_moving(Vec2::Zero(), Vec3::Zero(), z);
+    return FaultMember<MbbrEkf, 3>{control}.is_urgent(Vec3(believed_rad_s, 0.0, 0.0), 20);
+  };
+  EXPECT_TRUE(urgent(7.0, 0.5)) << "0.65 rad in 0.1 s";
+  EXPECT_FALSE(urgent(7.0, 1.5)) << "the control brakes it, if not enough";
+  EXPECT_TRUE(urgent(-5.0, 1.5)) << "it drives it";
+  EXPECT_FALSE(urgent(-5.0, 0.5));
+  EXPECT_FALSE(urgent(1.0, 9.0)) << "it brakes what is not there";
+}
+
 /// A ratio of likelihoods exceeds e^h with a chance of e^-h at most, whatever the model (Ville 1939); its sum
 /// since it was last refuted starts anew at most every tick.
 TEST_F(Standing, RatiosOfAHealthyRobotAreRarerThanTheoryAllows) {
