@@ -13,6 +13,7 @@ namespace equipoise::runtime {
 
 struct HeartbeatPage {
   static constexpr std::uint32_t kMagic = 0x45514842;  // "EQHB"
+  static constexpr std::int64_t kGuardSilent_ns = 30'000'000;
   std::atomic<std::uint32_t> magic;
   std::atomic<std::int64_t> loop_ns;       // monotonic: the loop's last beat, one per whole tick; 0: none yet
   std::atomic<std::int64_t> guard_ns;      // and when the guard last looked
@@ -20,13 +21,15 @@ struct HeartbeatPage {
   std::atomic<std::uint32_t> want_enable;  // 1: the loop drives; the guard keeps the bridges awake
   std::atomic<std::int64_t> cut_ns;        // monotonic; the motors were off by then, the last time
   std::atomic<std::uint32_t> answered;     // the last cut for which the loop has let go
+
+  /// The guard looks at every second tick at least: silent for six, it is dead.
+  bool guard_is_dead(std::int64_t now_ns) const noexcept {
+    return now_ns - guard_ns.load(std::memory_order_acquire) > kGuardSilent_ns;
+  }
 };
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
                   std::atomic<std::int64_t>::is_always_lock_free,
               "shared between processes");
-
-/// The guard looks at every second tick at least: silent for six, it is dead.
-inline constexpr std::int64_t kGuardSilent_ns = 30'000'000;
 
 /// Maps the page; throws std::runtime_error saying what is wrong with it.
 class SharedHeartbeat : NoCopy {

@@ -34,8 +34,7 @@ class Supervisor {
       reasons |= kLogFailed;  // nothing runs unrecorded
     if (watched_.page != nullptr) {
       const std::uint32_t cut = watched_.page->cut.load(std::memory_order_acquire);
-      if (now_ns - watched_.page->guard_ns.load(std::memory_order_acquire) > kGuardSilent_ns)
-        reasons |= kGuardDead;
+      if (watched_.page->guard_is_dead(now_ns)) reasons |= kGuardDead;
       if (cut != cut_) reasons |= kOverrun;  // it stopped us: we were too late
       cut_ = cut;
     }

@@ -40,8 +40,7 @@ void ManualDrive::beat() {
   if (heartbeat_ == nullptr) return;
   const std::int64_t now_ns = runtime::monotonic_now_ns();
   heartbeat_->loop_ns.store(now_ns, std::memory_order_release);
-  if (now_ns - heartbeat_->guard_ns.load(std::memory_order_acquire) > runtime::kGuardSilent_ns)
-    throw JobError("the guard process has died; motors are off");
+  if (heartbeat_->guard_is_dead(now_ns)) throw JobError("the guard process has died; motors are off");
   if (heartbeat_->cut.load(std::memory_order_acquire) != heartbeat_->answered.load(std::memory_order_relaxed))
     throw JobError(
         "a tick came too late and the guard has switched the motors off: end other programs, try again");
