@@ -183,7 +183,9 @@ TEST(SupervisorTest, ADeadGuardForbidsMotors) {
     raw.t_ns = now;
     if (guard_lives) page.guard_ns = now;
     const std::uint32_t reasons = supervisor.begin(now, raw);
+    const std::int64_t beat_ns = page.loop_ns;
     supervisor.end(true, 0);
+    EXPECT_GT(page.loop_ns, beat_ns) << "every tick beats, whoever lives";
     return reasons;
   };
   EXPECT_EQ(tick(false), kGuardDead);  // never seen
