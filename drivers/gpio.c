@@ -41,8 +41,9 @@ static int find_chip(const char* chip, char path[SYSFS_PATH_MAX]) {
   return status;
 }
 
-/* `flags` of GPIO_V2_LINE_FLAG_...; `active`: at first, of an output. */
-static int request(gpio_line_t* line, const gpio_pin_t* pin, uint64_t flags, bool active) {
+/* `attribute`: one more than `flags` of GPIO_V2_LINE_FLAG_... say, id 0: none. */
+static int request(gpio_line_t* line, const gpio_pin_t* pin, uint64_t flags,
+                   struct gpio_v2_line_attribute attribute) {
   line->open = false;
   line->fd = -1;
   char path[SYSFS_PATH_MAX];
@@ -55,13 +56,10 @@ static int request(gpio_line_t* line, const gpio_pin_t* pin, uint64_t flags, boo
   asked.offsets[0] = pin->offset;
   asked.num_lines = 1;
   strcpy(asked.consumer, "equipoise");
-  asked.config.flags = flags;
-  if ((flags & GPIO_V2_LINE_FLAG_OUTPUT) != 0) {
-    asked.config.num_attrs = 1;
-    asked.config.attrs[0].attr.id = GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES;
-    asked.config.attrs[0].attr.values = active;
-    asked.config.attrs[0].mask = 1;
-  }
+  asked.config.flags = flags | (pin->active_low ? GPIO_V2_LINE_FLAG_ACTIVE_LOW : 0);
+  asked.config.num_attrs = attribute.id != 0;
+  asked.config.attrs[0].attr = attribute;
+  asked.config.attrs[0].mask = attribute.id != 0; /* all of an unused one must be 0 */
   status = ioctl(chip, GPIO_V2_GET_LINE_IOCTL, &asked) < 0 ? -errno : 0;
   close(chip);
   if (status < 0) return status;
@@ -70,20 +68,28 @@ static int request(gpio_line_t* line, const gpio_pin_t* pin, uint64_t flags, boo
   return 0;
 }
 
-static uint64_t polarity(const gpio_pin_t* pin) { return pin->active_low ? GPIO_V2_LINE_FLAG_ACTIVE_LOW : 0; }
+static const struct gpio_v2_line_attribute kNone;
 
 int gpio_open_output(gpio_line_t* line, const gpio_pin_t* pin, bool active) {
-  return request(line, pin, GPIO_V2_LINE_FLAG_OUTPUT | polarity(pin), active);
+  const struct gpio_v2_line_attribute first = {.id = GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES, .values = active};
+  return request(line, pin, GPIO_V2_LINE_FLAG_OUTPUT, first);
 }
 
 int gpio_open_input(gpio_line_t* line, const gpio_pin_t* pin) {
-  return request(line, pin, GPIO_V2_LINE_FLAG_INPUT | polarity(pin), false);
+  return request(line, pin, GPIO_V2_LINE_FLAG_INPUT, kNone);
 }
 
 int gpio_open_edge(gpio_line_t* line, const gpio_pin_t* pin, enum gpio_edge edge) {
+  const gpio_pin_t electrical = {.chip = pin->chip, .offset = pin->offset, .active_low = false};
   const uint64_t which =
       edge == GPIO_FALLING ? GPIO_V2_LINE_FLAG_EDGE_FALLING : GPIO_V2_LINE_FLAG_EDGE_RISING;
-  return request(line, pin, GPIO_V2_LINE_FLAG_INPUT | which, false);
+  return request(line, &electrical, GPIO_V2_LINE_FLAG_INPUT | which, kNone);
+}
+
+int gpio_open_press(gpio_line_t* line, const gpio_pin_t* pin, unsigned stable_us) {
+  const struct gpio_v2_line_attribute stable = {.id = GPIO_V2_LINE_ATTR_ID_DEBOUNCE,
+                                                .debounce_period_us = stable_us};
+  return request(line, pin, GPIO_V2_LINE_FLAG_INPUT | GPIO_V2_LINE_FLAG_EDGE_RISING, stable);
 }
 
 bool gpio_is_open(const gpio_line_t* line) { return line->open; }
@@ -109,22 +115,42 @@ static int read_edges(const gpio_line_t* line, int64_t* edge_ns) {
   return count;
 }
 
-int gpio_wait_edge(gpio_line_t* line, int64_t deadline_ns, int64_t* edge_ns) {
+/* 1, 0 at the deadline, or -errno. */
+static int wait_readable(struct pollfd fds[], int count, int64_t deadline_ns) {
   for (;;) {
     int64_t left_ns = deadline_ns - monotonic_ns();
     if (left_ns < 0) left_ns = 0;
     const struct timespec timeout = {.tv_sec = (time_t)(left_ns / 1000000000),
                                      .tv_nsec = (long)(left_ns % 1000000000)};
-    struct pollfd poll_fd = {.fd = line->fd, .events = POLLIN, .revents = 0};
-    const int ready = ppoll(&poll_fd, 1, &timeout, NULL);
-    if (ready == 0) return 0;
-    if (ready < 0) {
-      if (errno == EINTR && left_ns > 0) continue;
-      return errno == EINTR ? 0 : -errno;
-    }
-    if ((poll_fd.revents & POLLIN) == 0) return -ENODEV;
-    return read_edges(line, edge_ns);
+    const int ready = ppoll(fds, (nfds_t)count, &timeout, NULL);
+    if (ready >= 0) return ready > 0;
+    if (errno != EINTR) return -errno;
+    if (left_ns == 0) return 0;
   }
+}
+
+int gpio_wait_edge(gpio_line_t* line, int64_t deadline_ns, int64_t* edge_ns) {
+  struct pollfd fd = {.fd = line->fd, .events = POLLIN, .revents = 0};
+  const int ready = wait_readable(&fd, 1, deadline_ns);
+  if (ready <= 0) return ready;
+  return (fd.revents & POLLIN) != 0 ? read_edges(line, edge_ns) : -ENODEV;
+}
+
+int gpio_wait_presses(gpio_line_t lines[], int count, int64_t deadline_ns) {
+  struct pollfd fds[GPIO_MAX_PRESSES];
+  if (count > GPIO_MAX_PRESSES) return -EINVAL;
+  for (int i = 0; i < count; ++i)
+    fds[i] = (struct pollfd){.fd = lines[i].fd, .events = POLLIN, .revents = 0}; /* poll passes over fd -1 */
+  const int ready = wait_readable(fds, count, deadline_ns);
+  int pressed = 0;
+  for (int i = 0; ready > 0 && i < count; ++i) {
+    if (fds[i].revents == 0) continue;
+    int64_t edge_ns = 0;
+    const int edges = (fds[i].revents & POLLIN) != 0 ? read_edges(&lines[i], &edge_ns) : -ENODEV;
+    if (edges < 0) return edges;
+    if (edges > 0) pressed |= 1 << i;
+  }
+  return ready < 0 ? ready : pressed;
 }
 
 void gpio_close(gpio_line_t* line) {

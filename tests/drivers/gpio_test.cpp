@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -50,6 +51,9 @@ int __wrap_ioctl(int fd, unsigned long request, ...) {
     kernel.chip = SyscallJournal::instance().pathOf(fd);
     kernel.asked = asked;
     if (failed(kernel.request_error) < 0) return -1;
+    const gpio_v2_line_config_attribute none{};
+    if (asked.config.num_attrs == 0 && std::memcmp(&asked.config.attrs[0], &none, sizeof none) != 0)
+      return failed(EINVAL);
     if (asked.config.num_attrs == 1) kernel.level = static_cast<int>(asked.config.attrs[0].attr.values);
     asked.fd = fcntl(kernel.ends[0], F_DUPFD_CLOEXEC, 3);
     SyscallJournal::instance().opened(asked.fd, "line");
@@ -139,6 +143,36 @@ TEST_F(Gpio, AnEdgeIsElectrical) {
   EXPECT_FALSE(gpio_is_open(&line_));
   ASSERT_EQ(gpio_open_edge(&line_, &pin_, GPIO_RISING), 0);
   EXPECT_EQ(asked().flags, GPIO_V2_LINE_FLAG_INPUT | GPIO_V2_LINE_FLAG_EDGE_RISING);
+}
+
+TEST_F(Gpio, AButtonIsDebouncedByTheKernel) {
+  pin_.active_low = true;
+  ASSERT_EQ(gpio_open_press(&line_, &pin_, 10000), 0);
+  EXPECT_EQ(asked().flags,
+            GPIO_V2_LINE_FLAG_INPUT | GPIO_V2_LINE_FLAG_EDGE_RISING | GPIO_V2_LINE_FLAG_ACTIVE_LOW);
+  ASSERT_EQ(asked().num_attrs, 1u);
+  EXPECT_EQ(asked().attrs[0].attr.id, static_cast<uint32_t>(GPIO_V2_LINE_ATTR_ID_DEBOUNCE));
+  EXPECT_EQ(asked().attrs[0].attr.debounce_period_us, 10000u);
+  EXPECT_EQ(asked().attrs[0].mask, 1u);
+}
+
+TEST_F(Gpio, PressesOfSeveralButtonsAreToldApart) {
+  gpio_line_t buttons[] = {{false, -1}, {false, -1}, {false, -1}};
+  const auto pressed = [&buttons](int64_t within_ns) {
+    return gpio_wait_presses(buttons, 3, monotonic_ns() + within_ns);
+  };
+  EXPECT_EQ(pressed(2000000), 0) << "none could be opened";
+  ASSERT_EQ(gpio_open_press(&buttons[2], &pin_, 10000), 0);
+  EXPECT_EQ(pressed(0), 0);
+  const gpio_v2_line_event event{};
+  for (int i = 0; i < 2; ++i) ASSERT_EQ(write(kernel.ends[1], &event, sizeof event), ssize_t{sizeof event});
+  EXPECT_EQ(pressed(1000000000), 4);
+  EXPECT_EQ(pressed(0), 0) << "told once";
+  close(kernel.ends[1]);
+  EXPECT_EQ(pressed(1000000000), -ENODEV) << "hung up: the chip is gone";
+  kernel.ends[1] = dup(kernel.ends[0]);
+  gpio_close(&buttons[2]);
+  EXPECT_EQ(gpio_wait_presses(buttons, GPIO_MAX_PRESSES + 1, 0), -EINVAL);
 }
 
 TEST_F(Gpio, ALineThatCannotBeHadLeavesNothingOpen) {

@@ -96,6 +96,24 @@ TEST_F(GpioHardware, WithoutAnEdgeTheDeadlineEndsTheWait) {
   EXPECT_GE(monotonic_ns(), deadline_ns);
 }
 
+TEST_F(GpioHardware, AButtonTellsOfEachPressOnceAndNotOfBounces) {
+  const gpio_pin_t pin = {"481ac000", 5, true};
+  const auto level = [this](bool high) { bench_.drivePin("481ac000", 5, high); };
+  const auto pressed = [this](int64_t within_ns) {
+    return gpio_wait_presses(&line_, 1, monotonic_ns() + within_ns);
+  };
+  constexpr int64_t kSecond_ns = 1000000000;
+  level(false);
+  ASSERT_EQ(gpio_open_press(&line_, &pin, 10000), 0);
+  EXPECT_EQ(pressed(kSecond_ns / 4), 0) << "down since before: no press";
+  level(true);
+  EXPECT_EQ(pressed(kSecond_ns / 4), 0) << "let go of";
+  for (const bool high : {false, true, false, true, false}) level(high);
+  EXPECT_EQ(pressed(10 * kSecond_ns), 1);
+  EXPECT_EQ(pressed(kSecond_ns / 4), 0);
+  level(true);
+}
+
 TEST_F(GpioHardware, ADeadProcessLosesItsLines) {
   const gpio_pin_t pin = {"44e07000", 20, false};
   const pid_t child = fork();

@@ -1,20 +1,19 @@
 // Buttons and LED bars on the robot: whoever stands beside it has the last word. In: board file, presses, the
 // command that was asked for -> out: the command that is allowed, LEDs. PAUSE disarms; pressed again it lets
 // arm, once whoever commands has let go of arming. MODE cycles full, half, quarter speed. Bars: as many as
-// the speed allows, blinking while paused. A thread of its own looks at the buttons; limit() is RT-safe. What
+// the speed allows, blinking while paused. A thread of its own waits for presses; limit() is RT-safe. What
 // cannot be opened is a warning, never a reason not to run.
 #pragma once
 
 #include <array>
 #include <atomic>
-#include <optional>
 #include <thread>
 #include <vector>
 
 #include "app/board/board.hpp"
-#include "button.h"
 #include "equipoise/no_copy.hpp"
 #include "equipoise/samples.hpp"
+#include "gpio.h"
 #include "led.h"
 
 namespace equipoise::app {
@@ -54,7 +53,7 @@ class Panel : NoCopy {
   void run();
 
   PanelGate gate_;
-  std::optional<button_t> pause_, mode_button_;
+  std::array<gpio_line_t, 2> buttons_;  // PAUSE, MODE
   std::vector<led_t> bars_;
   std::atomic<bool> paused_{false};
   std::atomic<std::size_t> mode_{0};
