@@ -14,9 +14,9 @@ namespace equipoise::runtime {
 namespace {
 
 constexpr std::size_t kQueueTicks = 1024;  // five seconds at 200 Hz
-// Between looks at an empty queue: four ticks on a robot, where to wake up costs more than to write one, and
+// Between looks at an empty queue: five ticks on a robot, where to wake up costs more than to write one, and
 // a log that SIGKILL may cut by 100 ms has time; less for a simulation, which waits when the queue is full.
-constexpr auto kIdle = std::chrono::milliseconds(20);
+constexpr auto kIdle = std::chrono::milliseconds(25);
 constexpr auto kIdleOfSimulation = std::chrono::milliseconds(2);
 
 std::string upper(std::string text) {

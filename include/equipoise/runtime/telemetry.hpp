@@ -30,7 +30,7 @@ struct TelemetryOptions {
   std::int64_t min_free_bytes = 0;      // below it the run's oldest files are deleted, then the log stops
   bool sync = false;                    // to the disk itself, for a power cut; else to the kernel
   bool keep_previous = false;           // a log of the same name is moved aside rather than replaced
-  double max_publish_hz = 25.0;         // of wall-clock time, for eyes; the log always has every tick
+  double max_publish_hz = 20.0;         // of wall-clock time, for eyes; the log always has every tick
   bool wait_when_full = false;          // simulation faster than real time: wait rather than drop
   std::vector<std::string> estimators;  // names of TickRecord::others
   std::function<void(const TickRecord&)> watch;  // called by the thread, record by record
