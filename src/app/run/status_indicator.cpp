@@ -57,12 +57,14 @@ can_frame StatusIndicator::frame(std::uint64_t status) noexcept {
 }
 
 void StatusIndicator::run() {
+  Lights shown{};  // dark, as they were opened
   for (unsigned turn = 0; !stop_.load(); ++turn) {
     const std::uint64_t status = now_.load(std::memory_order_relaxed);
     const auto state = static_cast<ArmState>(static_cast<std::uint8_t>(status >> 32U));
     const Lights show = lights(state, static_cast<std::uint32_t>(status), turn);
-    if (green_) (void)led_set(&*green_, show.green);
-    if (red_) (void)led_set(&*red_, show.red);
+    if (green_ && show.green != shown.green) (void)led_set(&*green_, show.green);
+    if (red_ && show.red != shown.red) (void)led_set(&*red_, show.red);
+    shown = show;
     if (can_) {
       const can_frame sent = frame(status);
       (void)can_send(&*can_, &sent);  // a bus without listeners must not disturb anybody

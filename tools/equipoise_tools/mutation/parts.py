@@ -44,11 +44,10 @@ DRIVER_FIXTURES = ("drivers/testbed.cpp", "drivers/fake_imu.cpp", "drivers/sysca
 DRIVER_TESTS = {
     **{
         name: name
-        for name in ("adc", "cutoff", "eqep", "events", "i2c_dev", "mpu9250", "pwm", "serial", "sysfs")
+        for name in ("adc", "cutoff", "eqep", "events", "i2c_dev", "led", "mpu9250", "pwm", "serial", "sysfs")
     },
     **{name: f"{name}*" for name in ("can", "dmp")},
     **dict.fromkeys(("bbb", "bbb_open", "bbb_error"), "bbb*"),
-    **dict.fromkeys(("led", "button"), "led_button"),
     **dict.fromkeys(("hbridge", "mc33926", "tb6612"), "bridge"),
 }
 DRIVER_BINARY = "tests/drivers/driver_tests"
