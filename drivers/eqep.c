@@ -10,7 +10,7 @@
 static const uint64_t kModulus32 = (uint64_t)1 << 32;
 
 int64_t eqep_difference(uint64_t last, uint64_t now, uint64_t modulus) {
-  const uint64_t forward = (now + modulus - last) % modulus;
+  const uint64_t forward = now >= last ? now - last : now + modulus - last;
   return forward > modulus / 2 ? -(int64_t)(modulus - forward) : (int64_t)forward;
 }
 
@@ -31,7 +31,7 @@ static int open_counter(eqep_t* encoder, const char* dir) {
   /* The ceiling resets to 0, where the count would stay; it must be set before the decoder runs. */
   if (status == 0) status = sysfs_write_number(count_dir, "enable", 0);
   if (status == 0) status = sysfs_write_text(count_dir, "function", "quadrature x4\n");
-  if (status == 0) status = sysfs_write_number(count_dir, "ceiling", kModulus32 - 1);
+  if (status == 0) status = sysfs_write_number(count_dir, "ceiling", UINT32_MAX);
   int64_t kept = 0; /* some decoders round it */
   if (status == 0) status = sysfs_read_number(count_dir, "ceiling", &kept);
   if (status == 0 && kept < 1) status = -ERANGE;

@@ -21,12 +21,12 @@ int led_open(led_t* led, const char* name, const gpio_pin_t* pin) {
 }
 
 int led_set(led_t* led, bool on) {
-  return led->fd >= 0 ? sysfs_write_u64(led->fd, on) : gpio_set(&led->line, on);
+  return led->fd >= 0 ? sysfs_write_u32(led->fd, on) : gpio_set(&led->line, on);
 }
 
 void led_close(led_t* led) {
   if (led->fd >= 0) {
-    (void)sysfs_write_u64(led->fd, 0);
+    (void)sysfs_write_u32(led->fd, 0);
     close(led->fd);
   } else if (gpio_is_open(&led->line)) {
     (void)gpio_set(&led->line, false);

@@ -78,7 +78,7 @@ static int start(pwm_t* pwm) {
   if (status < 0) return status;
   pwm->duty_fd = sysfs_open(pwm->dir, "duty_cycle", O_WRONLY);
   if (pwm->duty_fd < 0) return pwm->duty_fd;
-  status = sysfs_write_u64(pwm->duty_fd, 0);
+  status = sysfs_write_u32(pwm->duty_fd, 0);
   return status < 0 ? status : sysfs_write_number(pwm->dir, "enable", 1);
 }
 
@@ -99,7 +99,7 @@ int pwm_open(pwm_t* pwm, const char* device, unsigned channel, uint32_t period_n
 
 int pwm_set_ns(pwm_t* pwm, uint32_t on_ns) {
   if (on_ns > pwm->period_ns) return -EINVAL;
-  return sysfs_write_u64(pwm->duty_fd, on_ns);
+  return sysfs_write_u32(pwm->duty_fd, on_ns);
 }
 
 int pwm_set_fraction(pwm_t* pwm, double fraction) {
@@ -110,7 +110,7 @@ int pwm_set_fraction(pwm_t* pwm, double fraction) {
 void pwm_close(pwm_t* pwm) {
   if (pwm->dir[0] == '\0') return;
   if (pwm->duty_fd >= 0) {
-    (void)sysfs_write_u64(pwm->duty_fd, 0);
+    (void)sysfs_write_u32(pwm->duty_fd, 0);
     close(pwm->duty_fd);
     (void)sysfs_write_number(pwm->dir, "enable",
                              0); /* some kernels oops when a running channel is unexported */

@@ -57,16 +57,16 @@ int sysfs_write_text(const char* dir, const char* attribute, const char* text) {
   return status;
 }
 
-int sysfs_write_number(const char* dir, const char* attribute, uint64_t value) {
+int sysfs_write_number(const char* dir, const char* attribute, uint32_t value) {
   const int fd = sysfs_open(dir, attribute, O_WRONLY);
   if (fd < 0) return fd;
-  const int status = sysfs_write_u64(fd, value);
+  const int status = sysfs_write_u32(fd, value);
   close(fd);
   return status;
 }
 
-int sysfs_write_u64(int fd, uint64_t value) {
-  char text[24]; /* digits by hand: snprintf may allocate and takes locale locks */
+int sysfs_write_u32(int fd, uint32_t value) {
+  char text[12]; /* digits by hand: snprintf may allocate and takes locale locks */
   char* p = text + sizeof text;
   *--p = '\n';
   do {
@@ -85,13 +85,10 @@ int sysfs_read_i64(int fd, int64_t* out) {
   const bool negative = *p == '-';
   if (negative) ++p;
   if (*p < '0' || *p > '9') return -EBADMSG;
-  uint64_t value = 0;
-  for (; *p >= '0' && *p <= '9'; ++p) {
-    const uint64_t digit = (uint64_t)(*p - '0');
-    if (value > ((uint64_t)INT64_MAX - digit) / 10) return -EBADMSG;
-    value = value * 10 + digit;
-  }
-  if (*p != '\0' && *p != '\n') return -EBADMSG;
+  uint64_t value = 0; /* 19 digits do not overflow; a division by digit takes this processor long */
+  for (const char* end = p + 19; *p >= '0' && *p <= '9' && p < end; ++p)
+    value = value * 10 + (uint64_t)(*p - '0');
+  if ((*p != '\0' && *p != '\n') || value > INT64_MAX) return -EBADMSG;
   *out = negative ? -(int64_t)value : (int64_t)value;
   return 0;
 }

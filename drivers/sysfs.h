@@ -22,10 +22,10 @@ int sysfs_open(const char* dir, const char* attribute, int flags); /* fd or -err
 int sysfs_read_text(const char* dir, const char* attribute, char* out, size_t size);
 int sysfs_read_number(const char* dir, const char* attribute, int64_t* out);
 int sysfs_write_text(const char* dir, const char* attribute, const char* text);
-int sysfs_write_number(const char* dir, const char* attribute, uint64_t value);
+int sysfs_write_number(const char* dir, const char* attribute, uint32_t value);
 
 int sysfs_read_i64(int fd, int64_t* out); /* -EBADMSG: not a number */
-int sysfs_write_u64(int fd, uint64_t value);
+int sysfs_write_u32(int fd, uint32_t value);
 
 #ifdef __cplusplus
 }

@@ -155,9 +155,9 @@ TEST_F(SysfsNumberTest, RefusesWhatIsNoNumber) {
 TEST_F(SysfsNumberTest, WritesDecimalNumbers) {
   const std::string path = writeFile("out", "");
   const int fd = open(path.c_str(), O_RDWR);
-  for (const uint64_t value : {uint64_t{0}, uint64_t{50000}, UINT64_MAX}) {
+  for (const uint32_t value : {0u, 50000u, UINT32_MAX}) {
     ASSERT_EQ(ftruncate(fd, 0), 0);
-    ASSERT_EQ(sysfs_write_u64(fd, value), 0);
+    ASSERT_EQ(sysfs_write_u32(fd, value), 0);
     char text[32] = {};
     ASSERT_GT(pread(fd, text, sizeof text - 1, 0), 0);
     EXPECT_EQ(std::string(text), std::to_string(value) + "\n");
@@ -168,6 +168,6 @@ TEST_F(SysfsNumberTest, WritesDecimalNumbers) {
 TEST_F(SysfsNumberTest, ShortWriteIsAnError) {
   const int fd = open(writeFile("out", "").c_str(), O_RDWR);
   SyscallJournal::instance().failWrite("/out", 0);
-  EXPECT_EQ(sysfs_write_u64(fd, 5), -EIO);
+  EXPECT_EQ(sysfs_write_u32(fd, 5), -EIO);
   close(fd);
 }

@@ -52,7 +52,7 @@ void unexportAll() {
   for (const char* device : {"48302200", "48304200"}) {
     char chip[SYSFS_PATH_MAX];
     if (sysfs_find("/sys/class/pwm", "pwmchip", device, chip) != 0) continue;
-    for (const uint64_t channel : {0, 1}) (void)sysfs_write_number(chip, "unexport", channel);
+    for (const uint32_t channel : {0, 1}) (void)sysfs_write_number(chip, "unexport", channel);
   }
 }
 }  // namespace

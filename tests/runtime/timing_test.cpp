@@ -64,6 +64,16 @@ TEST(TimeHistogramTest, QuantilesAreWithinABin) {
   EXPECT_EQ(histogram.max_ns(), 900'000'000'000);
 }
 
+TEST(TimeHistogramTest, ABinEndsBelowItsUpperEdge) {
+  for (std::size_t bin = 0; bin < TimeHistogram::kBins; ++bin) {
+    TimeHistogram histogram;
+    const bool last = bin + 1 == TimeHistogram::kBins;
+    histogram.add(bin == 0 ? 0 : TimeHistogram::upper_ns(bin - 1));
+    histogram.add(last ? INT64_MAX : TimeHistogram::upper_ns(bin) - 1);
+    EXPECT_EQ(histogram.bins()[bin], 2) << bin;
+  }
+}
+
 TEST(RealtimeTest, SaysItemByItemWhatIsMissing) {
   RealtimeWish wish;
   wish.priority = 0;

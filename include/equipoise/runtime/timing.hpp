@@ -4,6 +4,7 @@
 // overruns in several ticks in a row, are kOverrun for actuate/safety. RT-safe.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -50,9 +51,10 @@ class TimeHistogram {
 
  private:
   static std::size_t bin_of(std::int64_t ns) noexcept {
-    std::size_t bin = 0;
-    while (bin + 1 < kBins && ns >= upper_ns(bin)) ++bin;
-    return bin;
+    if (ns < upper_ns(0)) return 0;
+    const auto octave = static_cast<std::size_t>(53 - __builtin_clzll(static_cast<std::uint64_t>(ns)));
+    const auto quarter = static_cast<std::size_t>(ns >> (octave + 8) & 3);
+    return std::min(1 + kBinsPerOctave * octave + quarter, kBins - 1);
   }
 
   std::array<std::int64_t, kBins> bins_{};

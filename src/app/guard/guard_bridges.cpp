@@ -34,12 +34,12 @@ FileBridges::~FileBridges() {
   for (const int fd : pwm_fds_) close(fd);
 }
 
-int FileBridges::enable() noexcept { return enable_fd_ >= 0 ? sysfs_write_u64(enable_fd_, 1) : 0; }
+int FileBridges::enable() noexcept { return enable_fd_ >= 0 ? sysfs_write_u32(enable_fd_, 1) : 0; }
 
 int FileBridges::off() noexcept {
-  int status = enable_fd_ >= 0 ? sysfs_write_u64(enable_fd_, 0) : 0;
+  int status = enable_fd_ >= 0 ? sysfs_write_u32(enable_fd_, 0) : 0;
   for (const int fd : pwm_fds_) {
-    const int next = sysfs_write_u64(fd, 0);
+    const int next = sysfs_write_u32(fd, 0);
     if (status == 0) status = next;
   }
   return status;
