@@ -191,7 +191,6 @@ class Pipeline : RobotContract<Robot, Estimators, Reference, Feedback> {
     in.motor_error = health_.motor_error;
     in.left_out = t.degraded & kSensorsLeftOut;
     in.tilt_sigma_rad = health_.tilt_sigma_rad;
-    in.saturated = t.saturated;
     in.all_finite = in.all_finite && t.u_friction.allFinite();
     in.bridges_gaps = health_.predicts_wheels;
     in.imu_trusted = health_.gyro_trusted && !t.z.accel_frozen;

@@ -104,7 +104,6 @@ bool Safety::tolerates(const SafetyInputs& in) noexcept {
 }
 
 std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs& in) noexcept {
-  saturated_ = count(saturated_, !(armed() && in.saturated));
   bridge_faults_ = count(bridge_faults_, !in.bridge_fault);
   bool stalled = false;
   for (std::size_t i = 0; i < stalled_.size(); ++i) {
@@ -117,7 +116,6 @@ std::uint32_t Safety::check_drive(const MotorCommand& wanted, const SafetyInputs
   if (bridge_faults_ >= kBridgeTicks) reasons |= kBridgeFault;
   if (stalled) reasons |= kStall;
   if (armed() && !(in.motor_error <= p_.max_motor_error)) reasons |= kMotorFault;
-  if (saturated_ > ticks(p_.max_saturated_s)) reasons |= kSaturated;
   return reasons;
 }
 

@@ -108,7 +108,7 @@ SafetyParams read_safety(Section s) {
   p.max_bias_drift_rad_s = s.number("max_bias_drift_rad_s", 0.001, 1.0);
   p.max_motor_error = s.number("max_motor_error", 0.01, 1000.0);
   p.max_wheel_rate_rad_s = s.number("max_wheel_rate_rad_s", 1.0, 10000.0);
-  p.max_saturated_s = s.number("max_saturated_s", 0.01, 60.0);
+  if (s.has("max_saturated_s")) (void)s.number("max_saturated_s", 0.01, 60.0);  // logs that had this limit
   p.max_stall_s = s.number("max_stall_s", 0.01, 60.0);
   p.command_timeout_s = s.number("command_timeout_s", 0.05, 60.0);
   s.finish();

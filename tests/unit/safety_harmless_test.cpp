@@ -116,7 +116,6 @@ TEST(Safety, WhatOnlyADrivenRobotShowsIsNothingAgainstArming) {
   in.bias_drift_rad_s = 1.0;
   in.motor_error = 10.0;
   in.encoders_stuck = in.encoders_reversed = 1;
-  in.saturated = true;
   in.state.theta_rad.x() = 0.20;
   in.state.omega_B_rad_s.z() = 2.0;
   MotorCommand command = half();
@@ -126,7 +125,6 @@ TEST(Safety, WhatOnlyADrivenRobotShowsIsNothingAgainstArming) {
     ASSERT_EQ(safety.reasons(), kNotRequested);
   }
   in = well();
-  in.saturated = true;
   in.command_age_s = 0.5;
   // Armed by the first tick, which was judged as a disarmed one.
   for (int i = 0; i < 61; ++i) ASSERT_TRUE(safety.gate(command, in).enable) << i << " " << safety.reasons();

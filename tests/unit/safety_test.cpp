@@ -86,7 +86,6 @@ const Fault kFaults[] = {
        in.turn_rad_s[2] = 20.0;
      }},
     {"dropped", kPickedUp, 10, [](SafetyInputs& in, MotorCommand&) { in.accel_m_s2 = 0.5; }},
-    {"saturated", kSaturated, 101, [](SafetyInputs& in, MotorCommand&) { in.saturated = true; }},
     {"bridge", kBridgeFault, 3, [](SafetyInputs& in, MotorCommand&) { in.bridge_fault = true; }},
     {"stall_of_the_last", kStall, 61,
      [](SafetyInputs& in, MotorCommand& m) {

@@ -57,7 +57,6 @@ struct SafetyParams {
   double max_bias_drift_rad_s = 0.1;   // of the gyro, against its mean over 20 s
   double max_motor_error = 0.75;       // duty by which a motor does other than told, as estimated
   double max_wheel_rate_rad_s = 90.0;  // wheels without load, beside the robot's turn: picked up
-  double max_saturated_s = 0.5;        // without a break
   double max_stall_s = 0.3;            // a wheel that stands still at nearly full duty
   double command_timeout_s = 0.5;      // older: ramp to a stop, do not arm
 };
@@ -82,7 +81,6 @@ struct SafetyInputs {
   std::array<double, kMaxMotors> wheel_rate_rad_s{};
   std::array<double, kMaxMotors> turn_rad_s{};  // of it, what the robot's own turn makes
   std::uint32_t left_out = 0;  // bits of sensors that were found out and are not used any more
-  bool saturated = false;
   bool all_finite = false;  // of everything the tick computed
   bool arm_requested = false;
   double command_age_s = 0.0;
@@ -127,7 +125,6 @@ class Safety {
   int battery_gone_ = 0;
   int battery_unknown_ = 0;
   int bridge_faults_ = 0;
-  int saturated_ = 0;
   int fast_ = 0;
   int falling_ = 0;
   std::array<int, kMaxMotors> stalled_{};
