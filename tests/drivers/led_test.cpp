@@ -1,7 +1,8 @@
+#include "led.h"
+
 #include <errno.h>
 
 #include "fake_gpio.hpp"
-#include "led.h"
 #include "syscall_journal.hpp"
 #include "testbed.hpp"
 

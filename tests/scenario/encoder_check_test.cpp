@@ -124,8 +124,7 @@ TEST(PickUp, TurnsTheMotorsOffWhenTheWheelsLoseTheGround) {
         run_trial<MipFirmware>(choice, 1, 8.0, [](RawSample&) {}, {"world.nominal.lift_at_s=3.0"});
     EXPECT_EQ(end.arm_state, ArmState::kFault) << controller;
     // Wheels in the air do not do what the gyro says: the detector may be first.
-    EXPECT_TRUE(end.reasons & (kPickedUp | kImuUntrusted))
-        << controller << " reasons " << end.reasons;
+    EXPECT_TRUE(end.reasons & (kPickedUp | kImuUntrusted)) << controller << " reasons " << end.reasons;
   }
 }
 

@@ -81,7 +81,7 @@ struct SafetyInputs {
   std::array<double, kMaxMotors> wheel_rate_rad_s{};
   std::array<double, kMaxMotors> turn_rad_s{};  // of it, what the robot's own turn makes
   std::uint32_t left_out = 0;  // bits of sensors that were found out and are not used any more
-  bool all_finite = false;  // of everything the tick computed
+  bool all_finite = false;     // of everything the tick computed
   bool arm_requested = false;
   double command_age_s = 0.0;
   std::uint32_t inhibit = 0;  // SafetyReason bits of the runtime: guard, real time, overruns, calibration

@@ -135,8 +135,8 @@ class ShadowRun {
   static constexpr double kLevel_rad = 5e-4;
   static constexpr int kBefore = 20;   // ticks that the senses need before a start, and after a fault
   static constexpr int kSettle = 100;  // ticks after a start that the tilt's error does not count
-  static constexpr std::uint32_t kNotOurs = kNotRequested | kCommandStale | kOverrun | kStall |
-                                            kBatteryLow | kNotCalibrated | kRealtimeMissing | kGuardDead;
+  static constexpr std::uint32_t kNotOurs = kNotRequested | kCommandStale | kOverrun | kStall | kBatteryLow |
+                                            kNotCalibrated | kRealtimeMissing | kGuardDead;
 
   /// Nothing that it asks of the motors happens.
   static typename P::Params of_shadow(typename P::Params p) {
