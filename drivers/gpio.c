@@ -147,7 +147,7 @@ int gpio_wait_presses(gpio_line_t lines[], int count, int64_t deadline_ns) {
     if (fds[i].revents == 0) continue;
     int64_t edge_ns = 0;
     const int edges = (fds[i].revents & POLLIN) != 0 ? read_edges(&lines[i], &edge_ns) : -ENODEV;
-    if (edges < 0) return edges;
+    if (edges < 0) gpio_close(&lines[i]); /* which must not keep the others from being heard */
     if (edges > 0) pressed |= 1 << i;
   }
   return ready < 0 ? ready : pressed;

@@ -29,8 +29,7 @@ enum { GPIO_MAX_PRESSES = 4 };
 int gpio_open_output(gpio_line_t* line, const gpio_pin_t* pin, bool active);
 int gpio_open_input(gpio_line_t* line, const gpio_pin_t* pin);
 int gpio_open_edge(gpio_line_t* line, const gpio_pin_t* pin, enum gpio_edge edge); /* electrical edge */
-/* A button; a level counts, and is told of, after `stable_us`. One that is down already counts once it was
- * up. */
+/* A button, debounced for `stable_us`; one that is down already counts once it was up. */
 int gpio_open_press(gpio_line_t* line, const gpio_pin_t* pin, unsigned stable_us);
 bool gpio_is_open(const gpio_line_t* line);
 
@@ -40,8 +39,8 @@ int gpio_get(const gpio_line_t* line); /* 0 or 1, or -errno */
 /* Waits for an edge until `deadline_ns`. Returns how many there were, 0 at the deadline, or -errno; *edge_ns
  * is the newest one's time. */
 int gpio_wait_edge(gpio_line_t* line, int64_t deadline_ns, int64_t* edge_ns);
-/* Waits for presses until `deadline_ns`: bit i is lines[i], at most GPIO_MAX_PRESSES, where those with fd -1
- * are never pressed; 0 at the deadline, or -errno. */
+/* Waits for presses until `deadline_ns`: bit i is lines[i], at most GPIO_MAX_PRESSES; 0 at the deadline, or
+ * -errno. A line that fails is closed, one that is closed (fd -1) never pressed. */
 int gpio_wait_presses(gpio_line_t lines[], int count, int64_t deadline_ns);
 
 void gpio_close(gpio_line_t* line); /* an output keeps its level or floats, as the chip likes: set it first */
