@@ -108,6 +108,8 @@ TEST_F(GpioHardware, AButtonTellsOfEachPressOnceAndNotOfBounces) {
   EXPECT_EQ(pressed(kSecond_ns / 4), 0) << "down since before: no press";
   level(true);
   EXPECT_EQ(pressed(kSecond_ns / 4), 0) << "let go of";
+  for (const bool high : {false, true}) level(high);
+  EXPECT_EQ(pressed(kSecond_ns / 4), 0) << "shorter than a press";
   for (const bool high : {false, true, false, true, false}) level(high);
   EXPECT_EQ(pressed(10 * kSecond_ns), 1);
   EXPECT_EQ(pressed(kSecond_ns / 4), 0);
