@@ -105,8 +105,9 @@ int gpio_get(const gpio_line_t* line) {
   return (values.bits & 1) != 0;
 }
 
-/* Newest of all queued edges: count, or -errno. Does not block where poll() has told of one. */
-static int read_edges(const gpio_line_t* line, int64_t* edge_ns) {
+/* Newest of all queued edges: count, or -errno. `told`: by poll(), so that it does not block. */
+static int read_edges(const gpio_line_t* line, short told, int64_t* edge_ns) {
+  if ((told & POLLIN) == 0) return -ENODEV;
   struct gpio_v2_line_event events[16]; /* the kernel queues as many */
   const ssize_t size = read(line->fd, events, sizeof events);
   if (size < 0) return -errno;
@@ -132,8 +133,7 @@ static int wait_readable(struct pollfd fds[], int count, int64_t deadline_ns) {
 int gpio_wait_edge(gpio_line_t* line, int64_t deadline_ns, int64_t* edge_ns) {
   struct pollfd fd = {.fd = line->fd, .events = POLLIN, .revents = 0};
   const int ready = wait_readable(&fd, 1, deadline_ns);
-  if (ready <= 0) return ready;
-  return (fd.revents & POLLIN) != 0 ? read_edges(line, edge_ns) : -ENODEV;
+  return ready <= 0 ? ready : read_edges(line, fd.revents, edge_ns);
 }
 
 int gpio_wait_presses(gpio_line_t lines[], int count, int64_t deadline_ns) {
@@ -146,7 +146,7 @@ int gpio_wait_presses(gpio_line_t lines[], int count, int64_t deadline_ns) {
   for (int i = 0; ready > 0 && i < count; ++i) {
     if (fds[i].revents == 0) continue;
     int64_t edge_ns = 0;
-    const int edges = (fds[i].revents & POLLIN) != 0 ? read_edges(&lines[i], &edge_ns) : -ENODEV;
+    const int edges = read_edges(&lines[i], fds[i].revents, &edge_ns);
     if (edges < 0) gpio_close(&lines[i]); /* which must not keep the others from being heard */
     if (edges > 0) pressed |= 1 << i;
   }

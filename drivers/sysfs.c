@@ -85,7 +85,7 @@ int sysfs_read_i64(int fd, int64_t* out) {
   const bool negative = *p == '-';
   if (negative) ++p;
   if (*p < '0' || *p > '9') return -EBADMSG;
-  uint64_t value = 0; /* 19 digits do not overflow; a division by digit takes this processor long */
+  uint64_t value = 0; /* 19 digits do not overflow; 64-bit division takes an ARM long */
   for (const char* end = p + 19; *p >= '0' && *p <= '9' && p < end; ++p)
     value = value * 10 + (uint64_t)(*p - '0');
   if ((*p != '\0' && *p != '\n') || value > INT64_MAX) return -EBADMSG;

@@ -52,7 +52,7 @@ class TimeHistogram {
  private:
   static std::size_t bin_of(std::int64_t ns) noexcept {
     if (ns < upper_ns(0)) return 0;
-    const auto octave = static_cast<std::size_t>(53 - __builtin_clzll(static_cast<std::uint64_t>(ns)));
+    const auto octave = static_cast<std::size_t>(63 - __builtin_clzll(static_cast<std::uint64_t>(ns >> 10)));
     const auto quarter = static_cast<std::size_t>(ns >> (octave + 8) & 3);
     return std::min(1 + kBinsPerOctave * octave + quarter, kBins - 1);
   }
