@@ -64,10 +64,6 @@ int gpio_open_edge(gpio_line_t* line, const gpio_pin_t* pin, enum gpio_edge edge
   return request(line, pin, false, false);
 }
 
-int gpio_open_press(gpio_line_t* line, const gpio_pin_t* pin, unsigned) {
-  return request(line, pin, false, false);
-}
-
 bool gpio_is_open(const gpio_line_t* line) { return line->open; }
 
 int gpio_set(gpio_line_t* line, bool active) {

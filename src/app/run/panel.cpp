@@ -61,9 +61,12 @@ void Panel::run() {
     shown = lit;
     const std::int64_t next_look_ns = runtime::monotonic_now_ns() + kLook_ns;
     const int pressed = gpio_wait_presses(buttons_.data(), static_cast<int>(buttons_.size()), next_look_ns);
-    if (pressed < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kLook_ns));
-    if (pressed > 0 && (pressed & 1) != 0) paused_.store(!paused_.load(), std::memory_order_relaxed);
-    if (pressed > 0 && (pressed & 2) != 0)
+    if (pressed < 0) {
+      std::this_thread::sleep_for(std::chrono::nanoseconds(kLook_ns));
+      continue;
+    }
+    if ((pressed & 1) != 0) paused_.store(!paused_.load(), std::memory_order_relaxed);
+    if ((pressed & 2) != 0)
       mode_.store((mode_.load() + 1) % PanelGate::kShares.size(), std::memory_order_relaxed);
   }
 }

@@ -98,7 +98,7 @@ const std::vector<Reason>& safety_reasons() {
        "freely",
        "put the robot down, arm again"},
       {kStall, "stall", "a wheel is driven hard and does not turn for safety.max_stall_s", "free the wheel"},
-      {kSaturated, "saturated", "motors at their limit for half a second; logs of 0.2 and before only",
+      {kSaturated, "saturated", "motors at their limit for half a second; older logs only",
        "charge the battery; lower the speed"},
       {kWheelSlip, "wheel_slip", "wheels and body disagreed; logs of 0.1 only",
        "clean floor, ball and wheels"},
