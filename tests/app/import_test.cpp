@@ -19,7 +19,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-std::string refusal(const std::string& path, const TableShape& shape = {}) {
+std::string table_refusal(const std::string& path, const TableShape& shape = {}) {
   try {
     read_table(path, shape);
   } catch (const InputError& error) {
@@ -60,12 +60,13 @@ TEST(Table, TakesWhatSpreadsheetsWriteAroundATable) {
 }
 
 TEST(Table, NamesWhatItCannotRead) {
-  EXPECT_THAT(refusal(own_file("d.csv", "a,b\n1,2\n3,four\n")),
+  EXPECT_THAT(table_refusal(own_file("d.csv", "a,b\n1,2\n3,four\n")),
               HasSubstr("d.csv:3: b: \"four\" is not a number"));
-  EXPECT_THAT(refusal(own_file("e.csv", "1,2\n3,4\n")), HasSubstr("table.columns"));
-  EXPECT_THAT(refusal(own_file("f.txt", "1 2\n3 4\n"), {{"a", "b", "c"}, false, 0}), HasSubstr("2 cells"));
-  EXPECT_THAT(refusal(own_file("g.mat", "MATLAB 5.0")), HasSubstr("./tools/table"));
-  EXPECT_THAT(refusal(own_file("h.bin", std::string("\0\0\0\0", 4))), HasSubstr("float32"));
+  EXPECT_THAT(table_refusal(own_file("e.csv", "1,2\n3,4\n")), HasSubstr("table.columns"));
+  EXPECT_THAT(table_refusal(own_file("f.txt", "1 2\n3 4\n"), {{"a", "b", "c"}, false, 0}),
+              HasSubstr("2 cells"));
+  EXPECT_THAT(table_refusal(own_file("g.mat", "MATLAB 5.0")), HasSubstr("./tools/table"));
+  EXPECT_THAT(table_refusal(own_file("h.bin", std::string("\0\0\0\0", 4))), HasSubstr("float32"));
 }
 
 /// Parts of a map, of which a test replaces one.

@@ -10,7 +10,6 @@ namespace {
 
 using app::SimSummary;
 
-constexpr int kSeeds = 20;
 const std::string kMbbr = std::string(EQUIPOISE_SOURCE_DIR) + "/config/mbbr.toml";
 
 struct Setting {
@@ -40,20 +39,17 @@ struct Drive {
 // [T] section 6.4.5: the drive rates at each yaw rate.
 constexpr Drive kThesisDrives[] = {{0.0, 0.20}, {0.5, 0.20}, {0.75, 0.15}, {1.0, 0.10}};
 
+SimSummary drive(const Drive& rates, std::uint64_t seed, Fidelity fidelity, MbbrEstimatorId estimator) {
+  return run({"thesis", rates.yaw_hz, rates.drive_mps, 60.0, seed, fidelity}, estimator);
+}
+
 class ThesisController : public testing::TestWithParam<Drive> {};
 
 TEST_P(ThesisController, HoldsTheIdealWorldWithTrueStatesForEverySeed) {
-  for (int seed = 1; seed <= kSeeds; ++seed) {
-    Setting o;
-    o.controller = "thesis";
-    o.yaw_hz = GetParam().yaw_hz;
-    o.drive_mps = GetParam().drive_mps;
-    o.duration_s = 60.0;
-    o.seed = static_cast<std::uint64_t>(seed);
-    o.fidelity = Fidelity::kIdeal;
-    const SimSummary s = run(o, MbbrEstimatorId::kTruth);
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const SimSummary s = drive(GetParam(), seed, Fidelity::kIdeal, MbbrEstimatorId::kTruth);
     EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s";
-    EXPECT_NEAR(s.yaw_rate_mean_hz, o.yaw_hz, 0.01);
+    EXPECT_NEAR(s.yaw_rate_mean_hz, GetParam().yaw_hz, 0.01);
     EXPECT_LT(s.position_rmse_m, 0.10);
   }
 }
@@ -62,15 +58,8 @@ INSTANTIATE_TEST_SUITE_P(DriveRates, ThesisController, testing::ValuesIn(kThesis
 class KfAttitude : public testing::TestWithParam<Drive> {};
 
 TEST_P(KfAttitude, HoldsTheThesisWorldForEverySeed) {
-  for (int seed = 1; seed <= kSeeds; ++seed) {
-    Setting o;
-    o.controller = "thesis";
-    o.yaw_hz = GetParam().yaw_hz;
-    o.drive_mps = GetParam().drive_mps;
-    o.duration_s = 60.0;
-    o.seed = static_cast<std::uint64_t>(seed);
-    o.fidelity = Fidelity::kThesis;
-    const SimSummary s = run(o, MbbrEstimatorId::kKfAttitude);
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const SimSummary s = drive(GetParam(), seed, Fidelity::kThesis, MbbrEstimatorId::kKfAttitude);
     EXPECT_FALSE(s.verdict.fell()) << "seed " << seed << " at " << s.verdict.fell_at_s << " s";
   }
 }
