@@ -23,11 +23,11 @@ def smoothed(values: np.ndarray, step_s: float) -> np.ndarray:
     """First-order low-pass, run forwards and backwards, the mean of the two ([T] section 6.4.5)."""
     # By the bilinear transform. SciPy's filters would double the time that a report takes to start.
     corner = np.tan(0.5 * SMOOTHING_RAD_S * step_s)
-    share = corner / (1 + corner)
+    pole, share = float((1 - corner) / (1 + corner)), corner / (1 + corner)
 
     def one_way(x: np.ndarray) -> np.ndarray:
-        pairs = share * (x[1:] + x[:-1])
-        return np.array([*accumulate(pairs, lambda y, pair: (1 - 2 * share) * y + pair, initial=x[0])])
+        pairs = (share * (x[1:] + x[:-1])).tolist()
+        return np.array([*accumulate(pairs, lambda y, pair: pole * y + pair, initial=float(x[0]))])
 
     return 0.5 * (one_way(values) + one_way(values[::-1])[::-1])
 
