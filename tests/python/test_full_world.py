@@ -93,6 +93,14 @@ def test_friction_on_every_wheel_is_no_motor_fault(tmp_path, monkeypatch):
     assert sum("motor_fault" in row["reasons"] for row in rows) <= 2  # 9 with the norm of all
 
 
+def test_wheels_that_slip_are_no_dead_motor(tmp_path, monkeypatch):
+    """A dead one lacks its torque for longer than they do."""
+    monkeypatch.setattr(full_world, "DURATION_S", 15.0)
+    rows = full_world.Trials(tmp_path, range(18361, 18401)).run("mbbr", "firmware", (2.0, 0.2))
+    assert len(rows) == 40
+    assert sum("motor_fault" in row["reasons"] for row in rows) <= 1  # 4 by the disturbance of the moment
+
+
 def test_wheels_that_slip_are_no_push(tmp_path):
     """What was taken for one let the filter follow them."""
     rows = full_world.Trials(tmp_path, range(8401, 8441)).run("mbbr", "nothing judged", (3.0, 0.2))

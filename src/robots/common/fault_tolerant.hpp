@@ -6,6 +6,7 @@
 #include <array>
 
 #include "equipoise/estimate/health.hpp"
+#include "equipoise/estimate/motor_error.hpp"
 #include "equipoise/estimate/rest_bias.hpp"
 #include "equipoise/estimate/rest_tilt.hpp"
 #include "equipoise/estimate/sensor_faults.hpp"
@@ -47,18 +48,19 @@ class FaultTolerant {
     report(faults_, &h);
     if (faults_.suspects()) return h;  // a fault may explain what the filter has made of it: a bias, a torque
     h.bias_drift_rad_s = bias_drift_.distance_rad_s();
-    h.motor_error = kinematics_.wheels_from_axes(ekf_.disturbance()).cwiseAbs().maxCoeff();
+    h.motor_error = motor_error_.worst();
     return h;
   }
 
  protected:
-  /// `evidence`: the default filter's parameters as the detector has them.
+  /// `evidence`: the default filter's parameters as the detector has them; `slips_s`: see motor_error.hpp.
   FaultTolerant(const Params& params, const SensorFaultsParams& faults,
-                const typename Filter::Params& evidence)
+                const typename Filter::Params& evidence, double slips_s)
       : params_(params),
         kinematics_(params.robot),
         ekf_(params.robot, params.ekf),
-        faults_(Filter(params.robot, evidence), faults) {}
+        faults_(Filter(params.robot, evidence), faults),
+        motor_error_(slips_s) {}
 
   static std::size_t index(Id id) noexcept { return static_cast<std::size_t>(id); }
   Estimate& at(Id id) noexcept { return estimates_[index(id)]; }
@@ -68,6 +70,7 @@ class FaultTolerant {
     ekf_.start(Filter::lean(tilt_rad), rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
     faults_.reset(ekf_, rest_bias_.noise_rad_s().norm() / std::sqrt(3.0));
     bias_drift_.reset(ekf_.gyro_biases());
+    motor_error_.reset();
   }
   /// After start_filter(), of a robot that moves as the sample says.
   void start_filter_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_rad_s, const Sample& z) noexcept {
@@ -86,6 +89,7 @@ class FaultTolerant {
     faults_.step(ekf_, u, z, omega_B);
     if (faults_.bias_jumps() != jumps) bias_drift_.jumped();
     bias_drift_.update(faults_.healthy().gyro_biases());
+    motor_error_.update(kinematics_.wheels_from_axes(ekf_.disturbance()), kinematics_.wheels_from_axes(u));
   }
 
   Params params_;
@@ -93,6 +97,7 @@ class FaultTolerant {
   Filter ekf_;
   SensorFaults<Filter, Robot::kWheels> faults_;
   SlowDrift<Filter::kBiases> bias_drift_;
+  MotorError<Robot::kWheels> motor_error_;
   RestTilt rest_tilt_;
   RestBias rest_bias_;
   std::array<Estimate, kCount> estimates_{};

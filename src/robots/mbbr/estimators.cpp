@@ -39,7 +39,8 @@ double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * kPi);
 }  // namespace
 
 MbbrEstimators::MbbrEstimators(const Params& params)
-    : FaultTolerant(params, sensor_faults(params), evidence(params.ekf)),
+    : FaultTolerant(params, sensor_faults(params), evidence(params.ekf),
+                    params.ekf.disturbance_time_constant_s),
       ekf13_published_(MbbrPublishedModel{}, params.ekf13_published),
       ekf13_(MbbrModel13(params.robot), params.ekf13),
       kf_(params.kf_published ? MbbrLinearModel::published()

@@ -26,10 +26,12 @@ MipEkf::Params evidence(MipEkf::Params p) {
   return p;
 }
 
+constexpr double kTyresSlipS = 0.0;  // that is, they roll
+
 }  // namespace
 
 MipEstimators::MipEstimators(const Params& params)
-    : FaultTolerant(params, sensor_faults(params), evidence(params.ekf)),
+    : FaultTolerant(params, sensor_faults(params), evidence(params.ekf), kTyresSlipS),
       complementary_kf_(MipInclinometerModel{}, params.complementary_kf),
       planar_kf_(MipPlanarModel(params.robot), params.planar_kf),
       ekf_published_(MipPublishedModel{}, params.ekf_published) {}

@@ -64,7 +64,7 @@ COMMANDS = (
     ),
 )
 
-ESTIMATORS = (*("heun", "kalman", "rest_bias", "sensor_faults", "slow_drift", "time_base"),)
+ESTIMATORS = (*("heun", "kalman", "motor_error", "rest_bias", "sensor_faults", "slow_drift", "time_base"),)
 # Where the filters of the robots are instantiated, once for all who use them.
 FILTERS = ("src/robots/mbbr/ekf.cpp", "src/robots/mip/ekf.cpp")
 CONTROL_TESTS = {
