@@ -325,6 +325,23 @@ def test_real_logs_pass_their_checks(root, tmp_path, name):
         assert all(0.5 < nis < 2 for nis in shadow["nis"].values()), shadow["nis"]
 
 
+@pytest.mark.parametrize("name", ["mini_segway_log278", "regbot_bal_log_1", "regbot_bal_log_2"])
+def test_real_logs_are_quiet_wherever_the_shadow_starts(root, tmp_path, name):
+    original = root / f"config/real/maps/{name}.toml"
+    table = real_log(root, original)
+    for later in range(-35, 125, 20):
+        text = re.sub(
+            r"(?<=\[\[balancing\]\]\nfrom_s = )[\d.]+",
+            lambda start, later=later: f"{float(start[0]) + 1e-3 * later:.3f}",
+            original.read_text(),
+        )
+        (tmp_path / "map.toml").write_text(text.replace('"../', f'"{root}/config/real/'))
+        run("import", table, "--map", tmp_path / "map.toml", "-o", tmp_path / "real.lcm")
+        shadow = json.loads(run("replay", tmp_path / "real.lcm", "--shadow", "--json", "-").stdout)
+        assert shadow["judged_s"] > 1
+        assert shadow["alarms"] == [], later
+
+
 def test_samples_that_are_none_are_no_noise(root, log, tmp_path):
     """Every fiftieth sample is invalid and nonsense: the noise is that of the others."""
     ticks = iter(range(10**9))

@@ -68,14 +68,12 @@ class FaultTolerant {
   /// At rest, tilted so.
   void start_filter(const Vec2& tilt_rad, const Sample& z) noexcept {
     ekf_.start(Filter::lean(tilt_rad), rest_bias_.update(z.gyro_B_rad_s), z.wheel_angle_rad);
-    faults_.reset(ekf_, rest_bias_.noise_rad_s().norm() / std::sqrt(3.0));
-    bias_drift_.reset(ekf_.gyro_biases());
-    motor_error_.reset();
+    start_detection();
   }
   /// After start_filter(), of a robot that moves as the sample says.
   void start_filter_moving(const Vec2& tilt_rad, const Vec3& gyro_bias_B_rad_s, const Sample& z) noexcept {
     ekf_.start_moving(Filter::lean(tilt_rad), gyro_bias_B_rad_s, z);
-    bias_drift_.reset(ekf_.gyro_biases());
+    start_detection();
     at(Id::kEkf) = ekf_.estimate();
   }
   /// A tick of the default filter; `omega_B`: body rates before it.
@@ -90,6 +88,12 @@ class FaultTolerant {
     if (faults_.bias_jumps() != jumps) bias_drift_.jumped();
     bias_drift_.update(faults_.healthy().gyro_biases());
     motor_error_.update(kinematics_.wheels_from_axes(ekf_.disturbance()), kinematics_.wheels_from_axes(u));
+  }
+
+  void start_detection() noexcept {
+    faults_.reset(ekf_, rest_bias_.noise_rad_s().norm() / std::sqrt(3.0));
+    bias_drift_.reset(ekf_.gyro_biases());
+    motor_error_.reset();
   }
 
   Params params_;

@@ -336,6 +336,23 @@ TEST(Rocking, IsNoSwapOfAxes) {
   }
 }
 
+TEST(Detection, BeginsWithTheMotionThatTheControlBeginsWith) {
+  const MipConfig config = load_mip(std::string(EQUIPOISE_SOURCE_DIR) + "/config/edumip.toml", {}).config;
+  MipEstimators estimators(config.estimators);
+  Mip::Sample z;
+  z.accel_B_m_s2 = Vec3(0.0, 0.0, -kGravity_m_s2);
+  z.gyro_B_rad_s = Vec3(1.0, 0.0, 0.0);
+  z.wheel_angle_rad.setZero();
+  z.wheel_rate_rad_s = MipKinematics(config.robot).wheels(8.0, 0.0);
+  z.imu_ok = z.encoders_ok = true;
+  estimators.start_moving(Vec2::Zero(), Vec3::Zero(), z);
+  for (int tick = 0; tick < 20; ++tick) {
+    z.wheel_angle_rad += kTickS * z.wheel_rate_rad_s;
+    estimators.update(z, Vec2::Zero(), false);
+    EXPECT_LT(estimators.health().evidence.ratio, 5.0) << tick;
+  }
+}
+
 /// The control's filter goes on as if there were no detector.
 TEST_F(Standing, NothingIsWeighedWithoutOneKindOfSensor) {
   gyro_sigma_rad_s = 0.0005;  // less than what the control's filter takes it for anyway
