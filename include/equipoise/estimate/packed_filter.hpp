@@ -200,6 +200,16 @@ class PackedFilter {
     });
   }
 
+  /// Keeps a state's estimate, no angle, within +-`most` (projection: Simon 2006, 7.5).
+  void limit(int state, double most) noexcept {
+    on_core(core_, [&](auto& core) {
+      auto& x = core.x[static_cast<std::size_t>(state)];
+      const auto limit = static_cast<RealOf<decltype(core)>>(most);
+      x = std::clamp(x, -limit, limit);
+      x_(state) = static_cast<double>(x);
+    });
+  }
+
   const Vec<n>& x() const noexcept { return x_; }
   double variance(int state) const noexcept { return P_at(state, state); }
   Mat<n, n> P() const noexcept {

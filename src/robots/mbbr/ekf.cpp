@@ -140,6 +140,7 @@ MbbrEkf::MbbrEkf(const MbbrParameters& robot, const Params& params)
     : params_(params),
       kinematics_(robot),
       mass_kg_(robot.m_t),
+      largest_scale_(3.0 * std::sqrt(params.filter.initial_variance(Model::kWheelScale))),
       filter_(Model(robot, params.disturbance_time_constant_s), params.filter, params.precision),
       time_(params.sensor_age_s) {
   const auto rates = [c = mbbr_coefficients(robot)](double lean_rad, double u) {

@@ -93,7 +93,10 @@ class MbbrEkf {
   /// The first half of update(): innovations and their variances, the state as predicted.
   void innovate(const Mbbr::Sample& z) noexcept;
   /// The second half.
-  void correct() noexcept { filter_.correct(); }
+  void correct() noexcept {
+    filter_.correct();
+    filter_.limit(Model::kWheelScale, largest_scale_);
+  }
   /// The state of another filter, with this one's noise: a copy of x and P, without constants.
   void adopt(const MbbrEkf& other) noexcept;
 
@@ -141,6 +144,7 @@ class MbbrEkf {
   Params params_;
   MbbrKinematics kinematics_;
   double mass_kg_;
+  double largest_scale_;  // three sigmas; what wheels turn beyond is slip, for long where they rub
   Filter filter_;
   Vec2 per_push_;  // change of tilt and ball rate in a tick, per N
   TimeBase<3, 3> time_;

@@ -99,6 +99,18 @@ TEST(MbbrEkf, FindsRadiiUnlikeTheConfiguredOnesWhileTurning) {
   }
 }
 
+TEST(MbbrEkf, WhatNoRadiusExplainsIsSlip) {
+  for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
+    Turning robot;
+    robot.wheel_scale = 0.2;
+    robot.config.estimators.ekf.precision = precision;
+    const MbbrEkf filter = robot.after(20.0);
+    const double sigma = std::sqrt(robot.config.estimators.ekf.filter.initial_variance(Model::kWheelScale));
+    EXPECT_NEAR(filter.x()(Model::kWheelScale), 3.0 * sigma, 1e-6);
+    EXPECT_NEAR(filter.estimate().theta_dot.z(), robot.rate_rad_s, 0.02);
+  }
+}
+
 TEST(MbbrEkf, HeadingIsOfTheTickWhateverTheSensorsAge) {
   for (const double age_s : {0.0, 0.0039, 0.0075}) {
     Turning slow;
