@@ -18,22 +18,21 @@ class MotorError {
   void reset() noexcept { now_ = felt_ = asked_ = Vec<Wheels>::Zero(); }
   /// Duties: what acts beside the command, the command.
   void update(const Vec<Wheels>& disturbance, const Vec<Wheels>& u) noexcept {
-    now_ = disturbance.cwiseAbs();
-    felt_ = keep_ * felt_ + disturbance.cwiseAbs2();
+    now_ = disturbance.cwiseAbs2();
+    felt_ = keep_ * felt_ + now_;
     asked_ = keep_ * asked_ + u.cwiseAbs2();
   }
   /// Of the worst motor; a dead one: near 1, where it is asked for all.
   double worst() const noexcept {
     double worst = 0.0;
-    for (int i = 0; i < Wheels; ++i)
-      worst = std::max(worst, std::min(now_(i), std::sqrt(felt_(i) / asked_(i))));
-    return worst;
+    for (int i = 0; i < Wheels; ++i) worst = std::max(worst, std::min(now_(i), felt_(i) / asked_(i)));
+    return std::sqrt(worst);
   }
 
  private:
-  double keep_;  // per tick
-  Vec<Wheels> now_ = Vec<Wheels>::Zero();
-  Vec<Wheels> felt_ = Vec<Wheels>::Zero();  // sums of squares
+  double keep_;                             // per tick
+  Vec<Wheels> now_ = Vec<Wheels>::Zero();   // squares
+  Vec<Wheels> felt_ = Vec<Wheels>::Zero();  // their sums
   Vec<Wheels> asked_ = Vec<Wheels>::Zero();
 };
 
