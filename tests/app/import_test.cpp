@@ -18,10 +18,12 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 std::string table_refusal(const std::string& path, const TableShape& shape = {}) {
   try {
-    read_table(path, shape);
+    const Table table = read_table(path, shape);
+    for (const std::string& name : table.names) table.column(name);
   } catch (const InputError& error) {
     return error.what();
   }
@@ -57,6 +59,13 @@ TEST(Table, TakesWhatSpreadsheetsWriteAroundATable) {
   const Table t = read_table(own_file("s.csv", "\xEF\xBB\xBF\"\"\n\"t\",\"u\"\n\"\"\n1,2\n\"\n"), {});
   EXPECT_THAT(t.names, ElementsAre("t", "u"));
   EXPECT_THAT(t.columns[1], ElementsAre(2.0));
+}
+
+TEST(Table, TakesTextInAColumnThatNobodyAsksFor) {
+  const Table t =
+      read_table(own_file("i.txt", "now 1 0x0\nlater 2 0x0\n"), {{"day", "u", "flags"}, false, 0});
+  EXPECT_THAT(t.column("u"), ElementsAre(1.0, 2.0));
+  EXPECT_THAT([&] { t.column("flags"); }, ThrowsMessage<InputError>(HasSubstr("i.txt:1: flags: \"0x0\"")));
 }
 
 TEST(Table, NamesWhatItCannotRead) {

@@ -70,15 +70,14 @@ BenchLog read_csv(const std::string& path) {
     throw InputError(path + ": " + std::to_string(table.torn_rows) + " rows have not a cell for each column");
   std::vector<BenchSample> rows(table.rows());
   for (const Field& field : kFields) {
-    const auto found = std::find(table.names.begin(), table.names.end(), field.name);
-    const bool there = found != table.names.end();
+    const bool there = std::count(table.names.begin(), table.names.end(), field.name) > 0;
     if (!there && !field.optional)
       throw InputError(path + ":1: no column " + field.name +
                        "; expected t_s,u,current_A,supply_V,angle_rad");
+    const std::vector<double>* column = there ? &table.column(field.name) : nullptr;
     for (std::size_t k = 0; k < rows.size(); ++k) {
       double& value = rows[k].*field.value;
-      value = there ? table.columns[static_cast<std::size_t>(found - table.names.begin())][k]
-                    : std::numeric_limits<double>::quiet_NaN();
+      value = there ? (*column)[k] : std::numeric_limits<double>::quiet_NaN();
       if (std::isnan(value) && !field.optional)
         throw InputError(path + ": " + field.name + " is missing in sample " + std::to_string(k));
     }

@@ -13,11 +13,7 @@ namespace {
 
 /// The column that a map names, out of a table.
 std::vector<double> column_of(const Table& table, const SignedColumn& column) {
-  const auto found = std::find(table.names.begin(), table.names.end(), column.name);
-  if (found == table.names.end())
-    throw InputError("the table has no column \"" + column.name + "\", which the map names; it has " +
-                     joined(table.names));
-  std::vector<double> values = table.columns[static_cast<std::size_t>(found - table.names.begin())];
+  std::vector<double> values = table.column(column.name);
   for (double& v : values) v *= column.factor;
   return values;
 }

@@ -10,6 +10,7 @@
 
 #include "app/text/errors.hpp"
 #include "app/text/files.hpp"
+#include "app/text/format.hpp"
 
 namespace equipoise::app {
 namespace {
@@ -36,14 +37,16 @@ void split(std::string_view line, std::vector<std::string_view>* cells) {
   }
 }
 
+/// NaN where the cell says so, is empty or is no number.
 bool number(std::string_view cell, double* value) {
-  if (cell.empty() || cell == "nan" || cell == "NaN") {
-    *value = std::numeric_limits<double>::quiet_NaN();
-    return true;
-  }
+  *value = std::numeric_limits<double>::quiet_NaN();
+  if (cell.empty() || cell == "nan" || cell == "NaN") return true;
   if (cell.front() == '+') cell.remove_prefix(1);
-  const auto end = std::from_chars(cell.data(), cell.data() + cell.size(), *value);
-  return end.ec == std::errc() && end.ptr == cell.data() + cell.size();
+  double read = 0.0;
+  const auto end = std::from_chars(cell.data(), cell.data() + cell.size(), read);
+  const bool whole = end.ec == std::errc() && end.ptr == cell.data() + cell.size();
+  if (whole) *value = read;
+  return whole;
 }
 
 void start(std::vector<std::string> names, Table* table) {
@@ -77,23 +80,21 @@ Table read_text_table(const std::string& path, const TableShape& shape) {
       throw InputError(path + ":" + std::to_string(number_of_line) +
                        ": no line of column names; name them in the map: table.columns = [...]");
     }
-    row.clear();
-    std::size_t wrong = cells.size();
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      row.emplace_back();
-      if (!number(cells[i], &row.back())) wrong = std::min(wrong, i);
-    }
-    const bool head = wrong == 0 && table.rows() == 0;  // of a table that the map names the columns of
-    if (head) continue;
+    row.resize(cells.size());
+    std::vector<std::size_t> text_cells;
+    for (std::size_t i = 0; i < cells.size(); ++i)
+      if (!number(cells[i], &row[i])) text_cells.push_back(i);
+    const bool head = table.rows() == 0 && !text_cells.empty() &&
+                      std::none_of(row.begin(), row.end(), [](double v) { return std::isfinite(v); });
+    if (head) continue;  // of a table that the map names the columns of
     if (row.size() == table.names.size() + 1 && std::isnan(row.back())) row.pop_back();  // "1,2,3,"
     if (row.size() != table.names.size()) {
       ++table.torn_rows;
       continue;
     }
-    if (wrong < row.size()) {
-      throw InputError(path + ":" + std::to_string(number_of_line) + ": " + table.names[wrong] + ": \"" +
-                       std::string(cells[wrong]) + "\" is not a number");
-    }
+    for (const std::size_t i : text_cells)
+      table.text.emplace(table.names[i], path + ":" + std::to_string(number_of_line) + ": " + table.names[i] +
+                                             ": \"" + std::string(cells[i]) + "\" is not a number");
     for (std::size_t i = 0; i < row.size(); ++i) table.columns[i].push_back(row[i]);
   }
   if (table.rows() == 0 && table.torn_rows > 0) {
@@ -128,6 +129,15 @@ Table read_float32_table(const std::string& path, const TableShape& shape) {
 }
 
 }  // namespace
+
+const std::vector<double>& Table::column(const std::string& name) const {
+  const auto at = static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+  if (at == names.size())
+    throw InputError("the table has no column \"" + name + "\", which the map names; it has " +
+                     joined(names));
+  if (const auto wrong = text.find(name); wrong != text.end()) throw InputError(wrong->second);
+  return columns[at];
+}
 
 Table read_table(const std::string& path, const TableShape& shape) {
   std::filesystem::path file(path);
