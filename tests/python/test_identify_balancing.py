@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from driven import real_log
 from equipoise_tools import planar_model as planar
+from equipoise_tools.foreign_log import configuration
 from equipoise_tools.identify_balancing import identify
 from equipoise_tools.paths import UserError
 from scipy.linalg import solve_continuous_are
@@ -73,6 +74,15 @@ def test_wrong_signs_and_short_logs_are_refused(log):
         identify(KNOWN, replace(log, u=-log.u))
     with pytest.raises(UserError, match="at least"):
         identify(KNOWN, log.part(np.arange(len(log.used)) < 400))
+
+
+def test_friction_does_not_throw_a_light_robots_wheels(root):
+    """REGBOT's stops them within a step or two: predictions that begin a hair apart stay together."""
+    regbot = planar.of_configuration(configuration(root / "config/real/regbot.toml"))
+    for begins in (0.0, 0.5, 1.0):
+        at = [np.full(2, 0.01), np.zeros(2), np.zeros(2), np.array([begins, begins + 1e-6])]
+        theta, phi = regbot.predict(*at, np.full((20, 2), 0.02))
+        assert abs(phi[1] - phi[0]) < 1e-7 and abs(theta[1] - theta[0]) < 1e-7
 
 
 def test_intervals_from_a_real_ball_bot_hold_on_its_next_24_s(root):

@@ -92,7 +92,8 @@ def identify(published: Planar, log: Motion) -> Identification:
     if r_squared < LEAST_R2:
         raise UserError(
             f"R2 of the wheels' acceleration is {r_squared:.2f}, at least {LEAST_R2} is needed: signs, "
-            "order or units of tilt, wheels or drive, or the configuration's masses and motor are wrong"
+            "order or units of tilt, wheels or drive, or the configuration's masses and motor are wrong, or "
+            "the drive changes faster than the log's rows show"
         )
     covariance = sandwich(fit, [b for b in blocks for _ in range(2)], whole)
     half = student.ppf(0.975, len(whole) - 1) * np.sqrt(np.diag(covariance)) * scale
@@ -135,7 +136,8 @@ def main() -> int:
         published = of_configuration(config)
         found = identify(published, log.part(t < split))
     except UserError as error:
-        print(f"error: {given.table}: {error}", file=sys.stderr)
+        where = "" if str(given.table) in str(error) else f"{given.table}: "
+        print(f"error: {where}{error}", file=sys.stderr)
         return 2
     except KeyError as missing:
         print(f"error: {given.map}: has no {missing}", file=sys.stderr)

@@ -43,7 +43,9 @@ class Planar:
         m22 = rolls + 2 * arm + self.body_inertia + self.body_mass * self.height**2
         determinant = m11 * m22 - m12**2
         fall = self.body_mass * GRAVITY * self.height * (theta - self.offset)
-        friction = self.coulomb * np.tanh(phi_dot / STICKS_RAD_S) + self.viscous * phi_dot
+        # A step of friction alone stops the wheels at most: else it throws those of a light robot to and fro.
+        stops = max(STICKS_RAD_S, STEP_S * self.coulomb * m22 / determinant)
+        friction = self.coulomb * np.tanh(phi_dot / stops) + self.viscous * phi_dot
         torque = self.k1 * drive - self.k2 * phi_dot - friction
         return (m11 * fall - m12 * torque) / determinant, (m22 * torque - m12 * fall) / determinant
 
