@@ -169,10 +169,13 @@ TEST(TableChecks, EachHasALimit) {
 TEST(TableChecks, AFactorNearAMistakeOfUnitsIsThatMistake) {
   const std::vector<std::pair<double, const char*>> known{{10.0, "ten"}, {0.1, "a tenth"}};
   for (const double off : {1.0, std::exp(0.19), std::exp(-0.19)}) {
-    EXPECT_EQ(units_mistake(10.0 * off, known), "ten");
-    EXPECT_EQ(units_mistake(-0.1 * off, known), "a tenth");
+    EXPECT_EQ(units_mistake(10.0 * off, 10.0 * off, known), "ten");
+    EXPECT_EQ(units_mistake(0.1 * off, 0.1 * off, known), "a tenth");
   }
-  for (const double off : {std::exp(0.21), std::exp(-0.21)}) EXPECT_EQ(units_mistake(10.0 * off, known), "");
+  for (const double off : {std::exp(0.21), std::exp(-0.21)})
+    EXPECT_EQ(units_mistake(10.0 * off, 10.0 * off, known), "");
+  EXPECT_EQ(units_mistake(3.0, 20.0, known), "ten")
+      << "what a fit says and its reverse are to each side of it";
   EXPECT_EQ(median({3.0, 9.0, 1.0}), 3.0);
 }
 

@@ -11,7 +11,7 @@ import equipoise as types
 import numpy as np
 import pandas as pd
 import pytest
-from driven import real_log, rewritten
+from driven import real_log, real_logs, rewritten
 from equipoise_robot import Log
 from equipoise_tools.paths import binary
 from scipy.io import savemat
@@ -139,6 +139,79 @@ def test_a_loop_per_wheel_does_not_make_wheels_that_never_turn_look_swapped(root
     assert out["by_name"]["drive_wheels_turn"]["value"] < 0
     assert "drive_wheels_turn" not in out["checks_failed"]
     assert "does not tell" in out["by_name"]["drive_wheels_turn"]["text"]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_loop_that_holds_the_wheels_speed_hides_no_sign_of_the_drive(root, table, tmp_path, sign):
+    held = pd.read_csv(table)  # as with the wheels in the air: 20 rad/s, half of the no-load speed
+    change = 0.5 * np.sin(10 * held.t)
+    for i in range(2):
+        held[f"e{i}"] = 20 * held.t - 0.05 * np.cos(10 * held.t)
+        held[f"d{i}"] = sign * (0.5 - 0.3 * change)
+    held.to_csv(tmp_path / "held.csv", index=False)
+    out = checks(tmp_path / "held.csv", write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
+    assert ("drive_wheels" in out["checks_failed"]) == (sign < 0)
+
+
+def test_noise_of_the_encoders_is_no_wrong_scale(root, table, tmp_path):
+    noisy = pd.read_csv(table)
+    noise = np.random.default_rng(5).standard_normal(len(noisy))
+    noise = pd.Series(noise).rolling(40, center=True, min_periods=1).mean()  # of the band that is compared
+    turn = noisy.e0 - noisy.e1
+    turn -= turn.rolling(400, center=True, min_periods=1).mean()
+    noise *= 0.08 * turn.std() / noise.std()
+    noisy["e0"], noisy["e1"] = noisy.e0 + noise, noisy.e1 - noise
+    noisy.to_csv(tmp_path / "noisy.csv", index=False)
+    config = root / "config/edumip.toml"
+    out = checks(tmp_path / "noisy.csv", write_map(tmp_path / "map.toml", config))
+    assert 0 < out["by_name"]["gyro_z_wheels"]["value"] < 1 / 1.4, "what noise leaves of it"
+    assert "gyro_z_wheels" not in out["checks_failed"]
+    wrong = write_map(tmp_path / "map.toml", config, units={"gyro": "rad/s"})
+    assert "gyro.unit is deg/s" in checks(tmp_path / "noisy.csv", wrong)["by_name"]["gyro_z_wheels"]["text"]
+
+
+def test_an_accelerometer_that_clips_is_no_wrong_channel(root, table, tmp_path):
+    shaken = pd.read_csv(table)
+    for axis in ("ax", "ay", "az"):
+        shaken[axis] = (1.5 * shaken[axis]).clip(-1.48, 1.48)
+    shaken.to_csv(tmp_path / "shaken.csv", index=False)
+    config = root / "config/edumip.toml"
+    out = checks(tmp_path / "shaken.csv", write_map(tmp_path / "map.toml", config))
+    assert "accel_clipping" in out["checks_failed"] and "accel_norm" not in out["checks_failed"]
+    assert "clips" in out["by_name"]["accel_norm"]["text"]
+    wrong = write_map(tmp_path / "map.toml", config, units={"accel": "m/s2"})
+    assert "accel.unit is g" in checks(tmp_path / "shaken.csv", wrong)["by_name"]["accel_norm"]["text"]
+
+
+# REGBOT held, let go or caught: outside of any envelope, but its columns are what the map says.
+HELD = {
+    "ballance_only_13": "t n ax ay az gx gy gz r0 r1 v0 v1 w0 w1 b n1 n2 n3 n4",
+    "ballance_only_13_free": "t n ax ay az gx gy gz r0 r1 v0 v1 w0 w1 b n1 n2 n3 n4",
+    "b1/tilt_log": "t ax ay az gx gy gz v0 v1 w0 w1 x y h tilt",
+}
+
+
+@pytest.mark.parametrize("name", HELD)
+@pytest.mark.parametrize("wrong", ["", "drive", "wheels"])
+def test_a_real_robot_that_does_not_balance_names_what_is_wrong_and_nothing_else(root, tmp_path, name, wrong):
+    table = real_logs(root) / f"SebastianBitsch+robobot-project/regbot/matlab/mekanisk/{name}.txt"
+    if not table.exists():
+        pytest.skip(f"no {table}: docs/reality.md says where such logs are from")
+    minus = {what: "-" if what == wrong else "" for what in ("drive", "wheels")}
+    map_file = tmp_path / "map.toml"
+    map_file.write_text(
+        f'robot = "{root}/config/real/regbot.toml"\n[table]\ncolumns = {json.dumps(HELD[name].split())}\n'
+        '[time]\ncolumn = "t"\nunit = "s"\n[gyro]\naxes = ["-gy", "-gx", "-gz"]\nunit = "deg/s"\n'
+        '[accel]\naxes = ["-ay", "-ax", "-az"]\nunit = "m/s2"\n[wheels]\nkind = "rate"\nunit = "rad/s"\n'
+        f'axes = ["{minus["wheels"]}w1", "{minus["wheels"]}w0"]\n[battery]\nvolts = 12\n[drive]\nkind = "volts"\n'
+        f'axes = ["{minus["drive"]}v1", "{minus["drive"]}v0"]\nunit = "V"\n'
+    )
+    out = json.loads(run("import", table, "--map", map_file, "-o", tmp_path / "a.lcm", "--json", "-").stdout)
+    failed = set(out["checks_failed"]) - {"gyro_clipping", "accel_clipping"}
+    if not wrong:
+        assert failed == set()
+    else:
+        assert "drive_wheels" in failed
 
 
 def test_shadow_of_a_healthy_run_is_quiet_and_of_a_dead_gyro_axis_is_not(root, table, tmp_path):

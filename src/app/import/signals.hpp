@@ -29,9 +29,12 @@ inline Series smooth(Series x, double hz) {
   return x;
 }
 
-/// What balancing moves, of any number of signals alike: their phases to each other stay.
+/// Without vibration, of any number of signals alike: their phases to each other stay.
+inline Series slow(const Series& x) { return smooth(smooth(x, kHigh_Hz), kHigh_Hz); }
+
+/// What balancing moves, of signals alike, too.
 inline Series balancing(const Series& x) {
-  const Series quiet = smooth(smooth(x, kHigh_Hz), kHigh_Hz);
+  const Series quiet = slow(x);
   return smooth(quiet - smooth(quiet, kLow_Hz), 2.0 * kHigh_Hz);
 }
 

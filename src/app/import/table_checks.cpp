@@ -10,13 +10,14 @@ namespace equipoise::app {
 
 namespace {
 
-constexpr double kNearUnit = 0.2;  // as close to a factor of units is a mistake of units
+constexpr double kNearUnit = 1.22;  // within this factor of a factor of units is a mistake of units
 
 }  // namespace
 
-std::string units_mistake(double scale, const std::vector<std::pair<double, const char*>>& known) {
+std::string units_mistake(double least, double most,
+                          const std::vector<std::pair<double, const char*>>& known) {
   for (const auto& [factor, what] : known)
-    if (std::abs(std::log(std::abs(scale) / factor)) < kNearUnit) return what;
+    if (least < factor * kNearUnit && most > factor / kNearUnit) return what;
   return "";
 }
 
@@ -107,11 +108,12 @@ Check check_norm(const ImportedRows& rows) {
   for (const Vec3& f : rows.accel_m_s2)
     if (f.allFinite()) norms.push_back(f.norm());
   const double share = norms.empty() ? kNotGiven : median(norms) / kGravity_m_s2;
-  Check c{"accel_norm", right(share), share, format("median %.3f g", share)};
-  const std::string mistake = units_mistake(share, {{1.0 / kGravity_m_s2, ": accel.unit is g, not m/s2"},
-                                                    {kGravity_m_s2, ": accel.unit is m/s2, not g"},
-                                                    {1e-3, ": accel.unit is mg, not g"},
-                                                    {1e3, ": accel.unit is g, not mg"}});
+  Check c{"accel_norm", share > 1.0 / kRight && share < kRight, share, format("median %.3f g", share)};
+  const std::string mistake = units_mistake(share / kRight, share,  // shaking raises it
+                                            {{1.0 / kGravity_m_s2, ": accel.unit is g, not m/s2"},
+                                             {kGravity_m_s2, ": accel.unit is m/s2, not g"},
+                                             {1e-3, ": accel.unit is mg, not g"},
+                                             {1e3, ": accel.unit is g, not mg"}});
   c.text += !mistake.empty() ? mistake : *c.ok ? "" : ": accel.scale or a channel is wrong";
   return c;
 }

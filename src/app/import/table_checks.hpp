@@ -10,11 +10,11 @@
 
 namespace equipoise::app {
 
-/// Which mistake of units makes a factor of `scale`; empty: none that is known.
-std::string units_mistake(double scale, const std::vector<std::pair<double, const char*>>& known);
+/// Which mistake of units makes a factor between two; empty: none that is known.
+std::string units_mistake(double least, double most,
+                          const std::vector<std::pair<double, const char*>>& known);
 
 constexpr double kRight = 1.4;  // so far off may be a radius, a track, an accelerometer's scale
-inline bool right(double scale, double factor = kRight) { return scale > 1.0 / factor && scale < factor; }
 
 std::vector<Check> check_table(const Table& table, const ImportedRows& rows, const ImportMap& map,
                                const ImportedRobot& robot);
