@@ -11,7 +11,7 @@ import equipoise as types
 import numpy as np
 import pandas as pd
 import pytest
-from driven import real_log, real_logs, rewritten
+from driven import rewritten
 from equipoise_robot import Log
 from equipoise_tools.paths import binary
 from scipy.io import savemat
@@ -183,37 +183,6 @@ def test_an_accelerometer_that_clips_is_no_wrong_channel(root, table, tmp_path):
     assert "accel.unit is g" in checks(tmp_path / "shaken.csv", wrong)["by_name"]["accel_norm"]["text"]
 
 
-# REGBOT held, let go or caught: outside of any envelope, but its columns are what the map says.
-HELD = {
-    "ballance_only_13": "t n ax ay az gx gy gz r0 r1 v0 v1 w0 w1 b n1 n2 n3 n4",
-    "ballance_only_13_free": "t n ax ay az gx gy gz r0 r1 v0 v1 w0 w1 b n1 n2 n3 n4",
-    "b1/tilt_log": "t ax ay az gx gy gz v0 v1 w0 w1 x y h tilt",
-}
-
-
-@pytest.mark.parametrize("name", HELD)
-@pytest.mark.parametrize("wrong", ["", "drive", "wheels"])
-def test_a_real_robot_that_does_not_balance_names_what_is_wrong_and_nothing_else(root, tmp_path, name, wrong):
-    table = real_logs(root) / f"SebastianBitsch+robobot-project/regbot/matlab/mekanisk/{name}.txt"
-    if not table.exists():
-        pytest.skip(f"no {table}: docs/reality.md says where such logs are from")
-    minus = {what: "-" if what == wrong else "" for what in ("drive", "wheels")}
-    map_file = tmp_path / "map.toml"
-    map_file.write_text(
-        f'robot = "{root}/config/real/regbot.toml"\n[table]\ncolumns = {json.dumps(HELD[name].split())}\n'
-        '[time]\ncolumn = "t"\nunit = "s"\n[gyro]\naxes = ["-gy", "-gx", "-gz"]\nunit = "deg/s"\n'
-        '[accel]\naxes = ["-ay", "-ax", "-az"]\nunit = "m/s2"\n[wheels]\nkind = "rate"\nunit = "rad/s"\n'
-        f'axes = ["{minus["wheels"]}w1", "{minus["wheels"]}w0"]\n[battery]\nvolts = 12\n[drive]\nkind = "volts"\n'
-        f'axes = ["{minus["drive"]}v1", "{minus["drive"]}v0"]\nunit = "V"\n'
-    )
-    out = json.loads(run("import", table, "--map", map_file, "-o", tmp_path / "a.lcm", "--json", "-").stdout)
-    failed = set(out["checks_failed"]) - {"gyro_clipping", "accel_clipping"}
-    if not wrong:
-        assert failed == set()
-    else:
-        assert "drive_wheels" in failed
-
-
 def test_shadow_of_a_healthy_run_is_quiet_and_of_a_dead_gyro_axis_is_not(root, table, tmp_path):
     out = checks(table, write_map(tmp_path / "map.toml", root / "config/edumip.toml"))
     healthy = json.loads(run("replay", out["log"], "--shadow", "--json", "-").stdout)
@@ -376,43 +345,6 @@ def test_wheel_order_and_azimuth_of_a_ball_bot_are_named(
     else:
         assert check in out["checks_failed"]
         assert named in out["by_name"][check]["text"]
-
-
-@pytest.mark.parametrize("name", ["mini_segway_log278", "regbot_bal_log_1", "regbot_bal_log_2"])
-def test_real_logs_pass_their_checks(root, tmp_path, name):
-    map_file = root / f"config/real/maps/{name}.toml"
-    table, log = real_log(root, map_file), tmp_path / "real.lcm"
-    out = json.loads(run("import", table, "--map", map_file, "-o", log, "--json", "-").stdout)
-    assert not {"gyro_x_accel", "wheels_accel", "drive_wheels", "gyro_z_wheels", "accel_up"} & set(
-        out["checks_failed"]
-    )
-    shadow = json.loads(run("replay", log, "--shadow", "--json", "-").stdout)
-    assert shadow["judged_s"] > 1
-    assert shadow["alarms"] == []
-    ahead = shadow["ahead"]["100ms"]
-    assert ahead["wheel"] < min(ahead[other]["wheel"] for other in ("persistence", "constant_rate"))
-    assert shadow["tilt_std_rad"] < (0.003 if name == "mini_segway_log278" else 0.008)
-    if name == "mini_segway_log278":
-        assert ahead["tilt"] < min(ahead[other]["tilt"] for other in ("persistence", "constant_rate"))
-    if name == "regbot_bal_log_2":
-        assert all(0.5 < nis < 2 for nis in shadow["nis"].values()), shadow["nis"]
-
-
-@pytest.mark.parametrize("name", ["mini_segway_log278", "regbot_bal_log_1", "regbot_bal_log_2"])
-def test_real_logs_are_quiet_wherever_the_shadow_starts(root, tmp_path, name):
-    original = root / f"config/real/maps/{name}.toml"
-    table = real_log(root, original)
-    for later in range(-35, 125, 20):
-        text = re.sub(
-            r"(?<=\[\[balancing\]\]\nfrom_s = )[\d.]+",
-            lambda start, later=later: f"{float(start[0]) + 1e-3 * later:.3f}",
-            original.read_text(),
-        )
-        (tmp_path / "map.toml").write_text(text.replace('"../', f'"{root}/config/real/'))
-        run("import", table, "--map", tmp_path / "map.toml", "-o", tmp_path / "real.lcm")
-        shadow = json.loads(run("replay", tmp_path / "real.lcm", "--shadow", "--json", "-").stdout)
-        assert shadow["judged_s"] > 1
-        assert shadow["alarms"] == [], later
 
 
 def test_samples_that_are_none_are_no_noise(root, log, tmp_path):
