@@ -48,6 +48,24 @@ class Identification:
 
 def identify(published: Planar, log: Motion) -> Identification:
     """Raises UserError with the reason when the log does not determine the parameters."""
+    found = fitted(published, log)
+    if found.r_squared >= LEAST_R2:
+        return found
+    flipped = {"tilt": {"theta": -log.theta}, "wheels": {"phi": -log.phi}, "drive": {"u": -log.u}}
+    tried = {name: fitted(published, replace(log, **sign)).r_squared for name, sign in flipped.items()}
+    best = max(tried, key=lambda name: tried[name])
+    raise UserError(
+        f"R2 of the wheels' acceleration is {found.r_squared:.2f}, at least {LEAST_R2} is needed: "
+        + (
+            f"the sign of {best} is flipped, with the other one R2 is {tried[best]:.2f}"
+            if tried[best] >= LEAST_R2
+            else "order or units of tilt, wheels or drive, or the configuration's masses and motor are wrong, "
+            "or the drive changes faster than the log's rows show"
+        )
+    )
+
+
+def fitted(published: Planar, log: Motion) -> Identification:
     axes = len(log.theta)
     names = [*FITTED, *(f"offset_{'xy'[i]}" for i in range(axes))]
     scale = np.array([*FITTED.values(), *[0.02] * axes])
@@ -89,12 +107,6 @@ def identify(published: Planar, log: Motion) -> Identification:
     r_squared = 1.0 - np.mean(np.square(np.concatenate(error[1::2]))) / np.mean(
         np.square(np.concatenate(straight))
     )
-    if r_squared < LEAST_R2:
-        raise UserError(
-            f"R2 of the wheels' acceleration is {r_squared:.2f}, at least {LEAST_R2} is needed: signs, "
-            "order or units of tilt, wheels or drive, or the configuration's masses and motor are wrong, or "
-            "the drive changes faster than the log's rows show"
-        )
     covariance = sandwich(fit, [b for b in blocks for _ in range(2)], whole)
     half = student.ppf(0.975, len(whole) - 1) * np.sqrt(np.diag(covariance)) * scale
     values = fit.x * scale
