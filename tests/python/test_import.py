@@ -118,6 +118,7 @@ def test_a_table_becomes_a_log_that_everything_reads(root, table, tmp_path):
         ({"columns": {"drive": ["d1", "d0"]}}, "drive_wheels_turn", "the drive's columns are swapped"),
         ({"columns": {"drive": ["-d0", "-d1"]}}, "drive_wheels", "the sign of drive or wheels is flipped"),
         ({"units": {"wheels": "rev"}}, "drive_wheels", "drive.unit, drive.kind or wheels.unit is wrong"),
+        ({"units": {"wheels": "rev"}}, "gyro_z_wheels", "wheels.unit is rad, not rev"),
     ],
 )
 def test_a_mistake_in_the_map_is_named(root, table, tmp_path, changes, check, named):

@@ -12,6 +12,8 @@
 namespace equipoise::app {
 namespace {
 
+constexpr double kSure = 3.0;  // standard errors
+
 /// Of a least squares fit, with its standard error.
 struct Coefficient {
   double value = 0.0;
@@ -19,8 +21,7 @@ struct Coefficient {
   /// What the fit of x on y says. Noise in x pulls `value` towards zero, noise in y this one away from it:
   /// the truth is between them (Frisch 1934).
   double reverse = 0.0;
-  /// It differs from zero by three sigma.
-  bool known() const { return std::abs(value) > 3.0 * sigma; }
+  bool known() const { return std::abs(value) > kSure * sigma; }
 };
 
 constexpr const char* kUntold = "; this log does not tell";
@@ -126,24 +127,30 @@ struct Comparison {
 
 Check scale_check(const Coefficient& c, const Comparison& of) {
   Check check{of.name, std::nullopt, c.value, std::string(of.what) + " " + shown(c)};
-  const double least = std::abs(c.value);
-  const double most = std::abs(c.reverse);
-  const bool right = least < of.factor && most > 1.0 / of.factor;
-  const std::string mistake = units_mistake(least, most, of.units);
-  if (!c.known() || (right && !mistake.empty())) {
+  if (!c.known()) {
     check.text += kUntold;
     return check;
   }
+  const double least = std::abs(c.value) - kSure * c.sigma;
+  const double most = std::abs(c.reverse) + kSure * c.sigma;
+  const bool right = least < of.factor && most > 1.0 / of.factor;
   check.ok = c.value > 0.0 && right;
   if (c.value < 0.0) check.text += ": " + of.flipped;
-  if (!mistake.empty()) check.text += ": " + mistake;
-  if (c.value > 0.0 && mistake.empty() && !right) check.text += ": a unit, a radius or a scale is wrong";
+  if (right) return check;
+  const std::string mistake = units_mistake(least, most, of.units);
+  if (!mistake.empty())
+    check.text += ": " + mistake;
+  else if (c.value > 0.0)
+    check.text += ": a unit, a radius or a scale is wrong";
   return check;
 }
 
 constexpr double kPerDegree = kPi / 180.0;
 const std::vector<std::pair<double, const char*>> kGyroUnits{
-    {1.0 / kPerDegree, "gyro.unit is deg/s, not rad/s"}, {kPerDegree, "gyro.unit is rad/s, not deg/s"}};
+    {1.0 / kPerDegree, "gyro.unit is deg/s, not rad/s"},
+    {kPerDegree, "gyro.unit is rad/s, not deg/s"},
+    {2.0 * kPi, "wheels.unit is rev, not rad"},
+    {0.5 / kPi, "wheels.unit is rad, not rev"}};
 /// What the gyro is measured with has the other factor.
 const std::vector<std::pair<double, const char*>> kUnitsOfGyroUnderTest{
     {kPerDegree, "gyro.unit is deg/s, not rad/s"}, {1.0 / kPerDegree, "gyro.unit is rad/s, not deg/s"}};
