@@ -70,11 +70,11 @@ def test_a_known_machine_is_found_within_its_intervals(log):
 
 
 def test_wrong_signs_and_short_logs_are_refused(log):
-    with pytest.raises(UserError, match="R2.*the sign of drive is flipped"):
+    with pytest.raises(UserError, match=r"R2.*the sign of drive is flipped"):
         identify(KNOWN, replace(log, u=-log.u))
-    with pytest.raises(UserError, match="R2.*the sign of wheels is flipped"):
+    with pytest.raises(UserError, match=r"R2.*the sign of wheels is flipped"):
         identify(KNOWN, replace(log, phi=-log.phi))
-    with pytest.raises(UserError, match="R2.*order or units"):
+    with pytest.raises(UserError, match=r"R2.*order or units"):
         identify(KNOWN, replace(log, u=np.roll(log.u, 500)))
     with pytest.raises(UserError, match="at least"):
         identify(KNOWN, log.part(np.arange(len(log.used)) < 400))

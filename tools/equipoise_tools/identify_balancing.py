@@ -59,8 +59,8 @@ def identify(published: Planar, log: Motion) -> Identification:
         + (
             f"the sign of {best} is flipped, with the other one R2 is {tried[best]:.2f}"
             if tried[best] >= LEAST_R2
-            else "order or units of tilt, wheels or drive, or the configuration's masses and motor are wrong, "
-            "or the drive changes faster than the log's rows show"
+            else "order or units of tilt, wheels or drive, or the configuration's masses and motor are "
+            "wrong, or the drive changes faster than the log's rows show"
         )
     )
 
