@@ -159,11 +159,12 @@ void check_tilt(const Grid& g, const ImportedRobot& robot, std::vector<Check>* c
   for (int axis = 0; axis < (robot.yaw ? 1 : 2); ++axis) {
     const std::vector<Coefficient> c = against_accel(g, robot, axis);
     const bool both = c[0].known() && c[1].known() && c[0].value < 0.0 && c[1].value < 0.0;
-    const std::string gyro = axis == 0 ? "gyro x" : "gyro y";
-    const std::string accel = axis == 0 ? "accel y" : "accel x";
+    const char* gyro = axis == 0 ? "gyro x" : "gyro y";
+    const char* accel = axis == 0 ? "accel y" : "accel x";
     // Which of two is flipped says the third, where this log tells it.
-    const auto flipped = [&](const std::string& one, const Coefficient& third) {
-      return (both ? accel : third.known() ? one : one + " or " + accel) + " is flipped";
+    const auto flipped = [&](const char* one, const Coefficient& third) {
+      if (both) return format("%s is flipped", accel);
+      return third.known() ? format("%s is flipped", one) : format("%s or %s is flipped", one, accel);
     };
     checks->push_back(
         scale_check(c[0], {axis == 0 ? "gyro_x_accel" : "gyro_y_accel", "accelerometer against gyro",
