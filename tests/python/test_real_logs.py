@@ -1,10 +1,14 @@
 """Logs of real robots through import and shadow: what is right passes, what is wrong has its name."""
 
+import itertools
 import json
 import re
 
+import numpy as np
 import pytest
-from driven import equipoise, real_log, real_logs
+from driven import CONFIGS, equipoise, real_log, real_logs, rewritten
+from equipoise_tools import noise_comparison
+from equipoise_tools.foreign_log import configuration
 
 
 @pytest.mark.parametrize("name", ["mini_segway_log278", "regbot_bal_log_1", "regbot_bal_log_2"])
@@ -78,3 +82,35 @@ def test_a_real_robot_that_does_not_balance_names_what_is_wrong_and_nothing_else
         assert failed == set()
     else:
         assert "drive_wheels" in failed
+
+
+@pytest.fixture(scope="module")
+def driven_for_20_s(root, robot, tmp_path_factory):
+    config, path = root / f"config/{CONFIGS[robot]}.toml", tmp_path_factory.mktemp("driven") / "run.lcm"
+    how = ["--duration-s", 20, "--drive-mps", 0.1, "--yaw-hz", 0.3, "--telemetry", "off", "--log", path]
+    assert equipoise(root, "sim", "--config", config, "--fidelity", "nominal", *how).returncode == 0
+    return path, configuration(config)["calibration"]
+
+
+@pytest.mark.parametrize("name", noise_comparison.MOTIONS)
+def test_what_shakes_a_real_robot_is_no_fault_of_a_simulated_one(root, driven_for_20_s, tmp_path, name):
+    healthy, calibration = driven_for_20_s
+    map_file, binary = root / f"config/real/maps/{name}.toml", root / "build/host/equipoise"
+    _, motions = noise_comparison.real_motions(binary, real_log(root, map_file), map_file)
+    axes = np.reshape(calibration["R_BS"], (3, 3))
+    counts = [np.degrees(calibration["gyro_counts_per_deg_s"]), calibration["accel_counts_per_g"] / 9.81]
+    for motion, samples in motions.items():
+        shaking = noise_comparison.high_passed(samples)
+        gyro, accel = (k * shaking[:, at : at + 3] @ axes for k, at in zip(counts, (0, 3), strict=True))
+        rows = itertools.cycle(zip(gyro, accel, strict=True))
+
+        def shaken(message, rows=rows):
+            if type(message).__name__ == "sensors_t":
+                gyro, accel = next(rows)
+                message.gyro_counts = list(np.round(message.gyro_counts + gyro))
+                message.accel_counts = list(np.round(message.accel_counts + accel))
+
+        log = rewritten(tmp_path / f"{motion}.lcm", healthy, shaken)
+        shadow = json.loads(equipoise(root, "replay", log, "--shadow", "--json", "-").stdout)
+        assert shadow["judged_s"] > 18
+        assert shadow["alarms"] == [], motion
