@@ -39,8 +39,7 @@ TEST(Table, ReadsCsvWithNamesBlanksAndEmptyCells) {
 }
 
 TEST(Table, ReadsColumnsByBlanksAfterCommentsAndCountsTornRows) {
-  const Table t =
-      read_table(own_file("b.txt", "% head\n%% more\n 1  2\n3 4 \n5\n6 7\n"), {{"a", "b"}, false, 0});
+  const Table t = read_table(own_file("b.txt", "% head\n%% more\n 1  2\n3 4 \n5\n6 7\n"), {{"a", "b"}});
   EXPECT_THAT(t.columns[1], ElementsAre(2.0, 4.0, 7.0));
   EXPECT_EQ(t.torn_rows, 1U);
 }
@@ -59,6 +58,7 @@ TEST(Table, TakesWhatSpreadsheetsWriteAroundATable) {
   const Table t = read_table(own_file("s.csv", "\xEF\xBB\xBF\"\"\n\"t\",\"u\"\n\"\"\n1,2\n\"\n"), {});
   EXPECT_THAT(t.names, ElementsAre("t", "u"));
   EXPECT_THAT(t.columns[1], ElementsAre(2.0));
+  EXPECT_THAT(read_table(own_file("k.csv", "t;u\n0,5;-1,25\n"), {}).columns[1], ElementsAre(-1.25));
 }
 
 TEST(Table, TakesTextInAColumnThatNobodyAsksFor) {
@@ -71,8 +71,7 @@ TEST(Table, NamesWhatItCannotRead) {
   EXPECT_THAT(table_refusal(own_file("d.csv", "a,b\n1,2\n3,four\n")),
               HasSubstr("d.csv:3: b: \"four\" is not a number"));
   EXPECT_THAT(table_refusal(own_file("e.csv", "1,2\n3,4\n")), HasSubstr("table.columns"));
-  EXPECT_THAT(table_refusal(own_file("f.txt", "1 2\n3 4\n"), {{"a", "b", "c"}, false, 0}),
-              HasSubstr("2 cells"));
+  EXPECT_THAT(table_refusal(own_file("f.txt", "1 2\n3 4\n"), {{"a", "b", "c"}}), HasSubstr("2 cells"));
   EXPECT_THAT(table_refusal(own_file("g.mat", "MATLAB 5.0")), HasSubstr("./tools/table"));
   EXPECT_THAT(table_refusal(own_file("h.bin", std::string("\0\0\0\0", 4))), HasSubstr("float32"));
 }

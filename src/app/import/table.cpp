@@ -17,13 +17,14 @@ namespace {
 
 constexpr std::string_view kBlank = " \t\r\"";
 
-/// Comma, semicolon or tab where a line has one, else runs of blanks; blanks around a cell do not count.
+/// Semicolon, tab or comma, the first of these that a line has, else runs of blanks; blanks around a cell do
+/// not count.
 void split(std::string_view line, std::vector<std::string_view>* cells) {
   cells->clear();
-  constexpr std::string_view kSeparators = ",;\t";
-  const auto* const found =
-      std::find_first_of(line.begin(), line.end(), kSeparators.begin(), kSeparators.end());
-  const char separator = found == line.end() ? ' ' : *found;
+  constexpr std::string_view kSeparators = ";\t,";
+  const auto* const found = std::find_if(kSeparators.begin(), kSeparators.end(),
+                                         [line](char c) { return line.find(c) != std::string_view::npos; });
+  const char separator = found == kSeparators.end() ? ' ' : *found;
   while (true) {
     const std::size_t begin = line.find_first_not_of(separator == '\t' ? " \r\"" : kBlank);
     line.remove_prefix(begin == std::string_view::npos ? line.size() : begin);
@@ -37,14 +38,16 @@ void split(std::string_view line, std::vector<std::string_view>* cells) {
   }
 }
 
-/// NaN where the cell says so, is empty or is no number.
+/// NaN where the cell says so, is empty or is no number. A comma that separates no cells is a decimal one.
 bool number(std::string_view cell, double* value) {
   *value = std::numeric_limits<double>::quiet_NaN();
   if (cell.empty() || cell == "nan" || cell == "NaN") return true;
   if (cell.front() == '+') cell.remove_prefix(1);
+  std::string text(cell);
+  std::replace(text.begin(), text.end(), ',', '.');
   double read = 0.0;
-  const auto end = std::from_chars(cell.data(), cell.data() + cell.size(), read);
-  const bool whole = end.ec == std::errc() && end.ptr == cell.data() + cell.size();
+  const auto end = std::from_chars(text.data(), text.data() + text.size(), read);
+  const bool whole = end.ec == std::errc() && end.ptr == text.data() + text.size();
   if (whole) *value = read;
   return whole;
 }
