@@ -158,6 +158,7 @@ def main() -> int:
     result: dict[str, Any] = {
         "log": str(given.table),
         "estimates": {n: asdict(e) for n, e in found.estimates.items()},
+        "configured": {n: getattr(published, n) for n in FITTED},
         "r_squared": found.r_squared,
         "check_s": float(rest.used.sum() * STEP_S),
         "ahead_configured": ahead([published] * len(log.theta), rest),

@@ -70,8 +70,13 @@ def measured(root: Path, table: Path, map_file: Path) -> dict[str, Any]:
         return {"checks_failed": checks["checks_failed"], **run("replay", log, "--shadow")}
 
 
+def can_be_identified(content: dict[str, Any]) -> bool:
+    """By the robot's own tilt: a fit and a check need some seconds each."""
+    stretches = content.get("balancing", [{"from_s": 0.0, "to_s": float("inf")}])
+    return "tilt" in content and sum(s["to_s"] - s["from_s"] for s in stretches) > 5.0
+
+
 def identified(table: Path, map_file: Path) -> dict[str, Any]:
-    """Of a log without raw gyro."""
     command = [sys.executable, "-m", "equipoise_tools.identify_balancing", str(table), "--map", str(map_file)]
     done = subprocess.run([*command, "--json"], stdout=subprocess.PIPE, check=True)
     result: dict[str, Any] = json.loads(done.stdout)
@@ -171,18 +176,19 @@ def page_of(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
             ahead_rows.append(f"| {run} | {ahead(x, 'tilt')} | {ahead(x, 'wheel')} |")
         noise_rows.append(f"| {name} | {noise(s, 'gyro')} | {noise(s, 'accel')} |")
     known_rows = [
-        "| log | fitted | rest: configured | identified | persistence | constant rate |",
-        "|---|---|---|---|---|---|",
+        "| log | fitted | configured | rest: configured | identified | persistence | constant rate |",
+        "|---|---|---|---|---|---|---|",
     ]
     for name, s in data.get("identified", {}).items():
         fitted = ", ".join(
             f"{n} {e['value']:.3g} +- {e['half_width_95']:.2g}" for n, e in s["estimates"].items()
         )
+        configured = ", ".join(f"{n} {value:.3g}" for n, value in s["configured"].items() if value)
         identified_ahead = s["ahead_identified"]
         errors = [s["ahead_configured"]["model"], identified_ahead["model"]]
         errors += [identified_ahead["persistence"], identified_ahead["constant_rate"]]
         cells = " | ".join(f"{shown(e['tilt'], 1e3, 1)}, {shown(e['wheel'], 1e3, 1)}" for e in errors)
-        known_rows.append(f"| {name} | {fitted} | {cells} |")
+        known_rows.append(f"| {name} | {fitted} | {configured} | {cells} |")
     for name, content in maps.items():
         source = content["source"]
         origin.append(
@@ -244,7 +250,7 @@ def main() -> int:
             data.setdefault("vibration", {})[file.stem] = shapes
         if "gyro" in maps[file.stem]:
             done[file.stem] = measured(root, table, file)
-        else:
+        if can_be_identified(maps[file.stem]):
             known = identified(table, file)
             data.setdefault("identified", {})[file.stem] = known | {"log": table.name}
     for file in sorted((root / MAPS).parent.glob("motors/*.toml")):
