@@ -181,7 +181,7 @@ def page_of(data: dict[str, Any], maps: dict[str, dict[str, Any]]) -> str:
     ]
     for name, s in data.get("identified", {}).items():
         fitted = ", ".join(
-            f"{n} {e['value']:.3g} +- {e['half_width_95']:.2g}" for n, e in s["estimates"].items()
+            f"{n} {round(e['value'], 6):.3g} +- {e['half_width_95']:.2g}" for n, e in s["estimates"].items()
         )
         configured = ", ".join(f"{n} {value:.3g}" for n, value in s["configured"].items() if value)
         identified_ahead = s["ahead_identified"]
