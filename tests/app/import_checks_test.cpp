@@ -146,6 +146,7 @@ TEST(TableChecks, EachHasALimit) {
          for (std::size_t k = 0; k < r.t_s.size(); ++k) r.wheel_rad[k][0] = k % 9 == 0 ? 9.0 : 0.0;
        },
        "is wheels.unit right?"},
+      {"wheel_jumps", false, jump(47.6), ", the largest 47.6 rad at 0.05"},
       {"gyro_clipping", true, range(1.0), "0.00 %"},
       {"gyro_clipping", false, range(0.985), "1.00 % of the samples"},
       {"gyro_clipping", true, plateau(4), "0.00 %"},

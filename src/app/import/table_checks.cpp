@@ -89,18 +89,23 @@ Check check_jumps(const ImportedRows& rows, const ImportedRobot& robot) {
   const double count = 2.0 * kPi / robot.calibration.encoder_counts_per_rev;
   std::size_t jumps = 0;
   double largest = 0.0;
+  double at_s = 0.0;
   for (std::size_t k = 1; k < rows.t_s.size(); ++k) {
     for (std::size_t i = 0; i < static_cast<std::size_t>(robot.wheels); ++i) {
       const double step = std::abs(rows.wheel_rad[k][i] - rows.wheel_rad[k - 1][i]);
       if (!(step > fastest * (rows.t_s[k] - rows.t_s[k - 1]) + 2.0 * count)) continue;
       ++jumps;
-      largest = std::max(largest, step);
+      if (step <= largest) continue;
+      largest = step;
+      at_s = rows.t_s[k];
     }
   }
   const bool units = jumps > rows.t_s.size() / 10;
-  return {"wheel_jumps", jumps == 0, static_cast<double>(jumps),
-          format("%zu steps beyond 1.5 times the no-load speed of %.0f rad/s%s", jumps, fastest / 1.5,
-                 units ? ": is wheels.unit right?" : "")};
+  Check c{"wheel_jumps", jumps == 0, static_cast<double>(jumps),
+          format("%zu steps beyond 1.5 times the no-load speed of %.0f rad/s", jumps, fastest / 1.5)};
+  if (jumps > 0) c.text += format(", the largest %.3g rad at %.3f s", largest, at_s);
+  if (units) c.text += ": is wheels.unit right?";
+  return c;
 }
 
 Check check_norm(const ImportedRows& rows) {
