@@ -1,7 +1,6 @@
 // A filter in single precision beside the one in double precision that balances the robot, on the same
 // samples and inputs: standing, driving and turning in turns, so that angles grow without bound.
-// EQUIPOISE_PRECISION_S=10800 runs it for hours: an eduMIP's heading is then apart by more in single
-// instants, without drift.
+// EQUIPOISE_PRECISION_S=10800 runs it for hours.
 #include <gtest/gtest.h>
 
 #include <algorithm>

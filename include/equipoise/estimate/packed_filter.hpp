@@ -1,7 +1,7 @@
 // KalmanFilter of a model whose step is generated as straight-line code: the same numbers up to rounding, for
 // a fraction of the instructions, in single or double precision. P is an upper triangle packed by rows, so
 // that it is symmetric by form; its rows start at even columns, so that pairs are aligned. Angles that grow
-// are kept within a few radians, so that single precision resolves them; what is whole in them stands beside.
+// are kept within a radian, so that single precision resolves them; what is whole in them stands beside.
 // An angle that no sample shows is forgotten before its variance takes the digits of the others'. Filters
 // that are copies share their constants; one can adopt the state of another for the price of a copy.
 // In: input, measurements with a mask of those to use -> state, variances, innovations and their variances.
@@ -356,14 +356,13 @@ class PackedFilter {
     }
   }
 
-  /// Whole radians leave the angles; exact in either precision.
+  /// Whole radians leave the angles; exact in either precision. What is left rounds by 6e-8 rad at most.
   template <class Real>
   void keep_small(Core<Real>& core) noexcept {
-    constexpr auto kLargest = static_cast<Real>(4);
     bool moved = false;
     for (int i = 0; i < Model::kTurnings; ++i) {
       Real& angle = core.x[static_cast<std::size_t>(Model::kTurning) + static_cast<std::size_t>(i)];
-      if (!(std::abs(angle) > kLargest) || !(std::abs(angle) < Real{1e9})) continue;
+      if (!(std::abs(angle) > Real{1}) || !(std::abs(angle) < Real{1e9})) continue;
       const auto whole = static_cast<std::int32_t>(angle);
       angle -= static_cast<Real>(whole);
       whole_(i) += whole;
