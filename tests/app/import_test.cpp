@@ -64,6 +64,7 @@ TEST(Table, TakesWhatSpreadsheetsWriteAroundATable) {
 TEST(Table, TakesTextInAColumnThatNobodyAsksFor) {
   const Table t = read_table(own_file("i.txt", "now 1 0x0\nlater 2 0x0\n"), {{"day", "u", "flags"}});
   EXPECT_THAT(t.column("u"), ElementsAre(1.0, 2.0));
+  EXPECT_EQ(read_table(own_file("j.csv", "a,b\n1,2,late\n3,4,\n"), {}).torn_rows, 1U) << "a cell too many";
   EXPECT_THAT([&] { t.column("flags"); }, ThrowsMessage<InputError>(HasSubstr("i.txt:1: flags: \"0x0\"")));
 }
 

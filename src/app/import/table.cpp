@@ -90,7 +90,9 @@ Table read_text_table(const std::string& path, const TableShape& shape) {
     const bool head = table.rows() == 0 && !text_cells.empty() &&
                       std::none_of(row.begin(), row.end(), [](double v) { return std::isfinite(v); });
     if (head) continue;  // of a table that the map names the columns of
-    if (row.size() == table.names.size() + 1 && std::isnan(row.back())) row.pop_back();  // "1,2,3,"
+    const bool ends_in_text = !text_cells.empty() && text_cells.back() + 1 == row.size();
+    if (row.size() == table.names.size() + 1 && std::isnan(row.back()) && !ends_in_text)
+      row.pop_back();  // "1,2,3,"
     if (row.size() != table.names.size()) {
       ++table.torn_rows;
       continue;
